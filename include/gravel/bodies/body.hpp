@@ -1,0 +1,63 @@
+#pragma once
+
+/// \file
+/// A body as a value: what one hands in, and what `load()` takes out.
+
+#include <gravel/bodies/fields.hpp>
+#include <gravel/core/check.hpp>
+
+#include <optional>
+
+namespace gravel {
+
+/// A rigid sphere. A body without mass and radius is a tracer: it feels gravity and does not pull.
+template <Real Scalar = double>
+struct Body {
+  Vector3<Scalar> position = Vector3<Scalar>::Zero();         ///< [m]
+  Vector3<Scalar> velocity = Vector3<Scalar>::Zero();         ///< [m s^-1]
+  Vector3<Scalar> angularVelocity = Vector3<Scalar>::Zero();  ///< [rad s^-1], axes of space
+  Quaternion<Scalar> orientation = Quaternion<Scalar>::Identity();  ///< normalised when added
+  Scalar mass = Scalar(1);    ///< [kg] >= 0; 0 only for a point (radius 0) or a fixed body
+  Scalar radius = Scalar(0);  ///< [m] >= 0; a body of radius 0 touches nothing of radius 0
+  bool fixed = false;  ///< never moves: inverse mass zero in contacts; its mass still pulls
+  std::optional<Scalar> inertia{};  ///< [kg m^2] > 0; without it a homogeneous sphere's 2/5 m r^2
+  MaterialId material = defaultMaterial;
+};
+
+/// Checks every field of a body. `who` names it in the message ("body 17").
+/// \throws std::invalid_argument naming the body, the field, its value and what is allowed
+template <Real Scalar>
+void validate(const Body<Scalar>& body, const std::string& who) {
+  const auto finite = [&](const char* field, const auto& v) {
+    if (!isFinite(v)) {
+      detail::refuse(std::string(field) + " of " + who, detail::formatVector(v), "finite");
+    }
+  };
+  const auto real = [&](const char* field, const Scalar& x, const detail::Range<Scalar>& range) {
+    if (!range.contains(x)) {
+      detail::refuse(std::string(field) + " of " + who, detail::formatReal(x), range.text);
+    }
+  };
+  finite("position", body.position);
+  finite("velocity", body.velocity);
+  finite("angularVelocity", body.angularVelocity);
+  finite("orientation", body.orientation.coeffs());
+  if (!(body.orientation.squaredNorm() > Scalar(0)) || !isFinite(body.orientation.squaredNorm())) {
+    detail::refuse("orientation of " + who, detail::formatVector(body.orientation.coeffs()),
+                   "a quaternion of finite, non-zero norm");
+  }
+  real("mass", body.mass, detail::nonNegative<Scalar>());
+  real("radius", body.radius, detail::nonNegative<Scalar>());
+  if (body.mass == Scalar(0) && body.radius > Scalar(0) && !body.fixed) {
+    detail::refuse("mass of " + who, "0", "> 0 for a movable body with a radius (a tracer has radius 0)");
+  }
+  if (body.inertia) {
+    real("inertia", *body.inertia, detail::nonNegative<Scalar>());
+    if (!(*body.inertia > Scalar(0)) || !(body.mass * body.radius * body.radius > Scalar(0))) {
+      detail::refuse("inertia of " + who, detail::formatReal(*body.inertia),
+                     "> 0, on a body with mass and radius");
+    }
+  }
+}
+
+}  // namespace gravel

@@ -1,0 +1,135 @@
+#pragma once
+
+/// \file
+/// A body in its storage, seen as one object.
+
+#include <gravel/bodies/body.hpp>
+#include <gravel/bodies/storage.hpp>
+
+namespace gravel {
+
+/// Handle of one body: a storage and an index. Fields of several coefficients are views that write through;
+/// fields of one are references. Stays valid until bodies are added, removed or reordered. A mutable proxy
+/// converts to a const one; there is no assignment, since it could mean two things: use load() and store().
+template <BodyStorage Storage, bool IsConst>
+class BasicBodyProxy {
+ public:
+  using Scalar = typename Storage::Scalar;
+  using StoragePointer = std::conditional_t<IsConst, const Storage*, Storage*>;
+
+  BasicBodyProxy(StoragePointer storage, std::size_t index) : storage_(storage), index_(index) {}
+  BasicBodyProxy(const BasicBodyProxy&) = default;
+  BasicBodyProxy& operator=(const BasicBodyProxy&) = delete;
+
+  operator BasicBodyProxy<Storage, true>() const  // NOLINT(google-explicit-constructor)
+    requires(!IsConst)
+  {
+    return {storage_, index_};
+  }
+
+  decltype(auto) position() const { return at(fields::Position{}); }
+  decltype(auto) velocity() const { return at(fields::Velocity{}); }
+  decltype(auto) angularVelocity() const { return at(fields::AngularVelocity{}); }
+  decltype(auto) orientation() const { return at(fields::Orientation{}); }
+  decltype(auto) force() const { return at(fields::Force{}); }
+  decltype(auto) torque() const { return at(fields::Torque{}); }
+  decltype(auto) acceleration() const { return at(fields::Acceleration{}); }
+  decltype(auto) angularAcceleration() const { return at(fields::AngularAcceleration{}); }
+  decltype(auto) mass() const { return at(fields::Mass{}); }
+  decltype(auto) radius() const { return at(fields::Radius{}); }
+
+  BodyId id() const { return BodyId{at(fields::Id{})}; }
+  std::size_t index() const { return index_; }
+  MaterialId material() const { return MaterialId{at(fields::Material{})}; }
+  bool isFixed() const { return (at(fields::Flags{}) & static_cast<std::uint32_t>(BodyFlag::Fixed)) != 0; }
+
+  /// [kg m^2] about any axis through the centre: k m r^2.
+  Scalar inertia() const {
+    const Scalar r = radius();
+    return Scalar(at(fields::InertiaFactor{})) * Scalar(mass()) * r * r;
+  }
+
+  /// [kg^-1]; zero for a fixed body and for a tracer, which no contact moves.
+  Scalar inverseMass() const {
+    const Scalar m = mass();
+    return isFixed() || !(m > Scalar(0)) ? Scalar(0) : Scalar(1) / m;
+  }
+
+  /// [kg^-1 m^-2]; zero for a fixed body and where the inertia is zero.
+  Scalar inverseInertia() const {
+    const Scalar moment = inertia();
+    return isFixed() || !(moment > Scalar(0)) ? Scalar(0) : Scalar(1) / moment;
+  }
+
+  void setMaterial(MaterialId material) const
+    requires(!IsConst)
+  {
+    at(fields::Material{}) = static_cast<std::uint32_t>(material);
+  }
+
+  /// A body that becomes fixed stops.
+  void setFixed(bool fixed) const
+    requires(!IsConst)
+  {
+    auto&& flags = at(fields::Flags{});
+    const auto bit = static_cast<std::uint32_t>(BodyFlag::Fixed);
+    flags = fixed ? flags | bit : flags & ~bit;
+    if (fixed) {
+      velocity() = Vector3<Scalar>::Zero().eval();
+      angularVelocity() = Vector3<Scalar>::Zero().eval();
+    }
+  }
+
+  /// The body as a value. Its inertia is filled in only where it differs from a homogeneous sphere's.
+  Body<Scalar> load() const {
+    Body<Scalar> body;
+    body.position = position();
+    body.velocity = velocity();
+    body.angularVelocity = angularVelocity();
+    body.orientation = Quaternion<Scalar>(orientation());
+    body.mass = mass();
+    body.radius = radius();
+    body.fixed = isFixed();
+    if (!(Scalar(at(fields::InertiaFactor{})) == homogeneousFactor())) {
+      body.inertia = inertia();
+    }
+    body.material = material();
+    return body;
+  }
+
+  /// Writes a value over the body; its id stays, forces and accelerations are cleared.
+  /// \throws std::invalid_argument on a field out of range, with nothing written
+  void store(const Body<Scalar>& body) const
+    requires(!IsConst)
+  {
+    validate(body, "body " + std::to_string(toInteger(id())));
+    const Vector3<Scalar> zero = Vector3<Scalar>::Zero();
+    position() = body.position;
+    velocity() = body.fixed ? zero : body.velocity;
+    angularVelocity() = body.fixed ? zero : body.angularVelocity;
+    orientation() = body.orientation.normalized();
+    force() = zero;
+    torque() = zero;
+    acceleration() = zero;
+    angularAcceleration() = zero;
+    mass() = body.mass;
+    radius() = body.radius;
+    at(fields::InertiaFactor{}) =
+        body.inertia ? *body.inertia / (body.mass * body.radius * body.radius) : homogeneousFactor();
+    at(fields::Flags{}) = body.fixed ? static_cast<std::uint32_t>(BodyFlag::Fixed) : 0U;
+    setMaterial(body.material);
+  }
+
+ private:
+  static Scalar homogeneousFactor() { return Scalar(2) / Scalar(5); }
+
+  template <class F>
+  decltype(auto) at(F field) const {
+    return storage_->at(field, index_);
+  }
+
+  StoragePointer storage_;
+  std::size_t index_;
+};
+
+}  // namespace gravel

@@ -1,0 +1,99 @@
+#pragma once
+
+/// \file
+/// Time by phase, and what was skipped and why.
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+
+namespace gravel {
+
+/// The phases of a step, in the order in which they run.
+enum class Phase : std::uint8_t {
+  Integration,
+  NeighbourSearch,
+  NarrowPhase,
+  Colouring,
+  ContactSolve,
+  PositionalCorrection,
+  Gravity,
+  Damping,
+  TimeStep,
+  Diagnostics,
+};
+
+inline constexpr std::size_t phaseCount = 10;
+
+constexpr const char* phaseName(Phase phase) {
+  constexpr std::array<const char*, phaseCount> names{
+      "integration",  "neighbour search",      "narrow phase", "colouring", "contact solve",
+      "pos. correction", "gravity",            "damping",      "time step", "diagnostics"};
+  return names[static_cast<std::size_t>(phase)];
+}
+
+/// Adds up wall-clock seconds, calls and skips by phase. Not shared between threads: a phase is entered by
+/// the thread that drives the step. Two readings of the clock a phase and step, about 50 ns.
+class Profiler {
+ public:
+  struct Entry {
+    double seconds = 0.0;
+    std::uint64_t calls = 0;
+    std::uint64_t skips = 0;
+    const char* reason = nullptr;  ///< why it was skipped the last time; a string literal
+  };
+
+  /// Times the rest of the enclosing scope.
+  class Scope {
+   public:
+    Scope(Profiler& profiler, Phase phase)
+        : entry_(profiler.entries_[static_cast<std::size_t>(phase)]), start_(Clock::now()) {}
+    Scope(const Scope&) = delete;
+    Scope& operator=(const Scope&) = delete;
+    ~Scope() {
+      entry_.seconds += std::chrono::duration<double>(Clock::now() - start_).count();
+      ++entry_.calls;
+    }
+
+   private:
+    using Clock = std::chrono::steady_clock;
+    Entry& entry_;
+    Clock::time_point start_;
+  };
+
+  void skip(Phase phase, const char* reason) {
+    Entry& entry = entries_[static_cast<std::size_t>(phase)];
+    ++entry.skips;
+    entry.reason = reason;
+  }
+
+  const Entry& entry(Phase phase) const { return entries_[static_cast<std::size_t>(phase)]; }
+
+  void reset() { entries_ = {}; }
+
+  /// One line a phase: seconds, share, calls, skips with the last reason.
+  void print(std::FILE* out) const {
+    double total = 0.0;
+    for (const Entry& entry : entries_) {
+      total += entry.seconds;
+    }
+    std::fprintf(out, "%-18s %12s %7s %10s %10s  %s\n", "phase", "seconds", "share", "runs", "skips",
+                 "last reason to skip");
+    for (std::size_t p = 0; p < phaseCount; ++p) {
+      const Entry& entry = entries_[p];
+      std::fprintf(out, "%-18s %12.6f %6.1f%% %10llu %10llu  %s\n", phaseName(static_cast<Phase>(p)),
+                   entry.seconds, total > 0.0 ? 100.0 * entry.seconds / total : 0.0,
+                   static_cast<unsigned long long>(entry.calls),
+                   static_cast<unsigned long long>(entry.skips),
+                   entry.reason != nullptr ? entry.reason : "-");
+    }
+    std::fprintf(out, "%-18s %12.6f\n", "total", total);
+  }
+
+ private:
+  std::array<Entry, phaseCount> entries_{};
+};
+
+}  // namespace gravel
