@@ -5,8 +5,10 @@
 
 #include <gravel/bodies/proxy.hpp>
 
+#include <algorithm>
 #include <optional>
 #include <span>
+#include <string>
 #include <unordered_map>
 #include <vector>
 
@@ -41,20 +43,25 @@ class Bodies {
   Bodies() = default;
 
   /// Adopts a storage with the bodies in it, which get the ids 0, 1, … in their order. A zero orientation or
-  /// inertia factor, as new storage has it, becomes the identity and 2/5.
-  /// \throws std::invalid_argument if a body's values are out of range
+  /// inertia factor, as new storage has it, becomes the identity and 2/5; fixed bodies are stopped,
+  /// orientations normalised, all else stays. \throws std::invalid_argument if a body's values are out of
+  /// range; then the storage's memory was not written to
   explicit Bodies(Storage storage) : storage_(std::move(storage)) {
+    reserve(size());
     for (std::size_t i = 0; i < size(); ++i) {
-      auto&& factor = storage_.at(fields::InertiaFactor{}, i);
-      if (!(factor > Scalar(0))) {
-        factor = Scalar(2) / Scalar(5);
+      validate(adopted(i), "body " + std::to_string(i));
+      index_.emplace(i, i);
+    }
+    for (; nextId_ < size(); ++nextId_) {
+      const auto i = static_cast<std::size_t>(nextId_);
+      const Body<Scalar> body = adopted(i);
+      const Proxy proxy = (*this)[i];
+      proxy.orientation() = body.orientation.normalized();
+      if (!body.inertia) {
+        storage_.at(fields::InertiaFactor{}, i) = detail::homogeneousFactor<Scalar>();
       }
-      if (!(Quaternion<Scalar>((*this)[i].orientation()).squaredNorm() > Scalar(0))) {
-        (*this)[i].orientation() = Quaternion<Scalar>::Identity();
-      }
-      validate((*this)[i].load(), "body " + std::to_string(nextId_));
+      proxy.setFixed(body.fixed);
       storage_.at(fields::Id{}, i) = nextId_;
-      index_[nextId_++] = i;
     }
   }
 
@@ -65,7 +72,8 @@ class Bodies {
   Storage& storage() { return storage_; }
   const Storage& storage() const { return storage_; }
 
-  /// Counts every change of the set or order of bodies: what was computed from indices is stale when it moves.
+  /// Counts every change of the set or order of bodies: what was computed from indices is stale when it
+  /// moves.
   std::uint64_t revision() const { return revision_; }
 
   void reserve(std::size_t n) {
@@ -78,7 +86,8 @@ class Bodies {
   /// Appends a body. \throws std::invalid_argument if a value is out of range; then nothing is added.
   BodyId add(const Body<Scalar>& body) { return add(body, BodyId{nextId_}); }
 
-  /// As above under a given id. \throws std::invalid_argument also if the id is taken.
+  /// As above under a given id: a restart gives each body its own again. Ids chosen by `add(body)` are above
+  /// all ids ever given. \throws std::invalid_argument also if the id is taken.
   BodyId add(const Body<Scalar>& body, BodyId id) {
     const std::uint64_t key = toInteger(id);
     if (index_.contains(key) || id == noBody) {
@@ -87,21 +96,36 @@ class Bodies {
     }
     validate(body, "body " + std::to_string(key));
     const std::size_t i = size();
-    index_[key] = i;
     storage_.resize(i + 1);
-    storage_.at(fields::Id{}, i) = key;
-    (*this)[i].store(body);
-    nextId_ = key >= nextId_ ? key + 1 : nextId_;
+    try {
+      storage_.at(fields::Id{}, i) = key;
+      (*this)[i].store(body);
+      index_.emplace(key, i);
+    } catch (...) {
+      storage_.resize(i);
+      throw;
+    }
+    skipIds(BodyId{key + 1});
     ++revision_;
     return id;
   }
+
+  /// The id that the next `add(body)` gives.
+  BodyId nextId() const { return BodyId{nextId_}; }
+
+  /// Ids below `first` are not given any more: a restart says so of bodies that were removed before it.
+  void skipIds(BodyId first) { nextId_ = std::max(nextId_, toInteger(first)); }
 
   /// Removes a body; the last one takes its index. O(1). \throws std::out_of_range for an unknown id
   void remove(BodyId id) {
     const std::size_t i = indexOf(id);
     const std::size_t last = size() - 1;
     if (i != last) {
-      detail::copyBody(storage_, i, std::as_const(storage_), last);
+      if constexpr (requires { storage_.swap(i, last); }) {
+        storage_.swap(i, last);
+      } else {
+        detail::copyBody(storage_, i, std::as_const(storage_), last);
+      }
       index_[storage_.at(fields::Id{}, i)] = i;
     }
     storage_.resize(last);
@@ -135,13 +159,8 @@ class Bodies {
       }
       seen[from] = true;
     }
-    typename SoA::template Storage<Scalar> copy;
-    copy.resize(size());
+    detail::permute(storage_, order);
     for (std::size_t i = 0; i < size(); ++i) {
-      detail::copyBody(copy, i, std::as_const(storage_), order[i]);
-    }
-    for (std::size_t i = 0; i < size(); ++i) {
-      detail::copyBody(storage_, i, std::as_const(copy), i);
       index_[storage_.at(fields::Id{}, i)] = i;
     }
     ++revision_;
@@ -154,11 +173,16 @@ class Bodies {
       const auto body = (*this)[i];
       const Scalar m = body.mass();
       const Scalar r = body.radius();
+      const Scalar k = storage_.at(fields::InertiaFactor{}, i);
+      const Scalar q_sq = body.orientation().squaredNorm();
       const bool good = isFinite(body.position()) && isFinite(body.velocity()) &&
                         isFinite(body.angularVelocity()) && isFinite(m) && isFinite(r) && m >= Scalar(0) &&
-                        r >= Scalar(0) && (m > Scalar(0) || r == Scalar(0) || body.isFixed());
+                        r >= Scalar(0) && (m > Scalar(0) || r == Scalar(0) || body.isFixed()) &&
+                        isFinite(q_sq) && q_sq > Scalar(0) && isFinite(k) && k > Scalar(0);
       if (!good) {
-        validate(body.load(), "body " + std::to_string(toInteger(body.id())));
+        const std::string who = "body " + std::to_string(toInteger(body.id()));
+        validate(body.load(), who);
+        checkFactor(k, who);
       }
     }
   }
@@ -192,6 +216,25 @@ class Bodies {
   auto flags() const { return Column<const Storage, fields::Flags>(storage_); }
 
  private:
+  static void checkFactor(const Scalar& k, const std::string& who) {
+    if (!isFinite(k) || !(k > Scalar(0))) {
+      detail::refuse("inertiaFactor of " + who, detail::formatReal(k), "finite, > 0");
+    }
+  }
+
+  /// Body i of a storage that was handed in, zeros of new storage filled in.
+  Body<Scalar> adopted(std::size_t i) const {
+    Body<Scalar> body = (*this)[i].load();
+    if (body.orientation.coeffs() ==
+        Quaternion<Scalar>(Scalar(0), Scalar(0), Scalar(0), Scalar(0)).coeffs()) {
+      body.orientation = Quaternion<Scalar>::Identity();
+    }
+    if (Scalar(storage_.at(fields::InertiaFactor{}, i)) == Scalar(0)) {
+      body.inertia.reset();
+    }
+    return body;
+  }
+
   Storage storage_;
   std::unordered_map<std::uint64_t, std::size_t> index_;
   std::uint64_t nextId_ = 0;

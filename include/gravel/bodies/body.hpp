@@ -13,19 +13,36 @@ namespace gravel {
 /// A rigid sphere. A body without mass and radius is a tracer: it feels gravity and does not pull.
 template <Real Scalar = double>
 struct Body {
-  Vector3<Scalar> position = Vector3<Scalar>::Zero();         ///< [m]
-  Vector3<Scalar> velocity = Vector3<Scalar>::Zero();         ///< [m s^-1]
-  Vector3<Scalar> angularVelocity = Vector3<Scalar>::Zero();  ///< [rad s^-1], axes of space
+  Vector3<Scalar> position = Vector3<Scalar>::Zero();               ///< [m]
+  Vector3<Scalar> velocity = Vector3<Scalar>::Zero();               ///< [m s^-1]
+  Vector3<Scalar> angularVelocity = Vector3<Scalar>::Zero();        ///< [rad s^-1], axes of space
   Quaternion<Scalar> orientation = Quaternion<Scalar>::Identity();  ///< normalised when added
-  Scalar mass = Scalar(1);    ///< [kg] >= 0; 0 only for a point (radius 0) or a fixed body
-  Scalar radius = Scalar(0);  ///< [m] >= 0; a body of radius 0 touches nothing of radius 0
-  bool fixed = false;  ///< never moves: inverse mass zero in contacts; its mass still pulls
+  Scalar mass = Scalar(1);          ///< [kg] >= 0; 0 only for a point (radius 0) or a fixed body
+  Scalar radius = Scalar(0);        ///< [m] >= 0; a body of radius 0 touches nothing of radius 0
+  bool fixed = false;               ///< never moves: inverse mass zero in contacts; its mass still pulls
   std::optional<Scalar> inertia{};  ///< [kg m^2] > 0; without it a homogeneous sphere's 2/5 m r^2
   MaterialId material = defaultMaterial;
 };
 
-/// Checks every field of a body. `who` names it in the message ("body 17").
-/// \throws std::invalid_argument naming the body, the field, its value and what is allowed
+namespace detail {
+
+template <Real Scalar>
+inline Scalar homogeneousFactor() {
+  return Scalar(Scalar(2) / Scalar(5));
+}
+
+/// k in I = k m r^2; divided step by step, as m r^2 leaves a float's range where I does not.
+template <Real Scalar>
+inline Scalar inertiaFactor(const Body<Scalar>& body) {
+  return body.inertia ? Scalar(*body.inertia / body.mass / body.radius / body.radius)
+                      : homogeneousFactor<Scalar>();
+}
+
+}  // namespace detail
+
+/// Checks every field of a body but the material, whose table is not known here. `who` names it in the
+/// message ("body 17"). \throws std::invalid_argument naming the body, the field, its value and what is
+/// allowed
 template <Real Scalar>
 void validate(const Body<Scalar>& body, const std::string& who) {
   const auto finite = [&](const char* field, const auto& v) {
@@ -52,10 +69,18 @@ void validate(const Body<Scalar>& body, const std::string& who) {
     detail::refuse("mass of " + who, "0", "> 0 for a movable body with a radius (a tracer has radius 0)");
   }
   if (body.inertia) {
-    real("inertia", *body.inertia, detail::nonNegative<Scalar>());
-    if (!(*body.inertia > Scalar(0)) || !(body.mass * body.radius * body.radius > Scalar(0))) {
-      detail::refuse("inertia of " + who, detail::formatReal(*body.inertia),
-                     "> 0, on a body with mass and radius");
+    const auto refuseInertia = [&](const char* allowed) {
+      detail::refuse("inertia of " + who, detail::formatReal(*body.inertia), allowed);
+    };
+    if (!isFinite(*body.inertia) || !(*body.inertia > Scalar(0))) {
+      refuseInertia("finite, > 0");
+    }
+    if (!(body.mass > Scalar(0)) || !(body.radius > Scalar(0))) {
+      refuseInertia("none, on a body without mass or radius");
+    }
+    const Scalar factor = detail::inertiaFactor(body);
+    if (!isFinite(factor) || !(factor > Scalar(0))) {
+      refuseInertia("what is finite and > 0 also as a multiple of m r^2");
     }
   }
 }

@@ -86,6 +86,9 @@ struct FieldList {
   /// First column of field F: the widths of those before it.
   template <class F>
   static constexpr int firstColumn() {
+    static_assert(
+        (std::is_same_v<F, Fields> || ...),
+        "gravel: gravel's own storages hold the fields of gravel::RealFields only, see docs/concepts.md");
     int column = 0;
     bool found = false;
     ((found = found || std::is_same_v<F, Fields>, column += found ? 0 : Fields::width), ...);
@@ -113,10 +116,14 @@ using RealFields = FieldList<fields::Position, fields::Velocity, fields::Angular
 using IntegerFields = IntegerFieldList<fields::Id, fields::Material, fields::Flags>;
 
 template <class F>
-concept RealField = requires { F::width; };
+concept RealField = requires {
+  F::width;
+};
 
 template <class F>
-concept IntegerField = requires { typename F::Integer; };
+concept IntegerField = requires {
+  typename F::Integer;
+};
 
 /// Every field, real ones first.
 template <class Visitor>

@@ -22,8 +22,7 @@ class BasicBodyProxy {
   BasicBodyProxy& operator=(const BasicBodyProxy&) = delete;
 
   operator BasicBodyProxy<Storage, true>() const  // NOLINT(google-explicit-constructor)
-    requires(!IsConst)
-  {
+      requires(!IsConst) {
     return {storage_, index_};
   }
 
@@ -46,31 +45,27 @@ class BasicBodyProxy {
   /// [kg m^2] about any axis through the centre: k m r^2.
   Scalar inertia() const {
     const Scalar r = radius();
-    return Scalar(at(fields::InertiaFactor{})) * Scalar(mass()) * r * r;
+    return Scalar(Scalar(at(fields::InertiaFactor{})) * Scalar(mass()) * r * r);
   }
 
   /// [kg^-1]; zero for a fixed body and for a tracer, which no contact moves.
   Scalar inverseMass() const {
     const Scalar m = mass();
-    return isFixed() || !(m > Scalar(0)) ? Scalar(0) : Scalar(1) / m;
+    return isFixed() || !(m > Scalar(0)) ? Scalar(0) : Scalar(Scalar(1) / m);
   }
 
   /// [kg^-1 m^-2]; zero for a fixed body and where the inertia is zero.
   Scalar inverseInertia() const {
     const Scalar moment = inertia();
-    return isFixed() || !(moment > Scalar(0)) ? Scalar(0) : Scalar(1) / moment;
+    return isFixed() || !(moment > Scalar(0)) ? Scalar(0) : Scalar(Scalar(1) / moment);
   }
 
-  void setMaterial(MaterialId material) const
-    requires(!IsConst)
-  {
+  void setMaterial(MaterialId material) const requires(!IsConst) {
     at(fields::Material{}) = static_cast<std::uint32_t>(material);
   }
 
   /// A body that becomes fixed stops.
-  void setFixed(bool fixed) const
-    requires(!IsConst)
-  {
+  void setFixed(bool fixed) const requires(!IsConst) {
     auto&& flags = at(fields::Flags{});
     const auto bit = static_cast<std::uint32_t>(BodyFlag::Fixed);
     flags = fixed ? flags | bit : flags & ~bit;
@@ -80,7 +75,8 @@ class BasicBodyProxy {
     }
   }
 
-  /// The body as a value. Its inertia is filled in only where it differs from a homogeneous sphere's.
+  /// The body as a value. Its inertia is filled in only where it differs from a homogeneous sphere's; on a
+  /// body without mass or radius there is none.
   Body<Scalar> load() const {
     Body<Scalar> body;
     body.position = position();
@@ -90,7 +86,8 @@ class BasicBodyProxy {
     body.mass = mass();
     body.radius = radius();
     body.fixed = isFixed();
-    if (!(Scalar(at(fields::InertiaFactor{})) == homogeneousFactor())) {
+    if (!(Scalar(at(fields::InertiaFactor{})) == detail::homogeneousFactor<Scalar>()) &&
+        !(body.mass == Scalar(0)) && !(body.radius == Scalar(0))) {
       body.inertia = inertia();
     }
     body.material = material();
@@ -99,9 +96,7 @@ class BasicBodyProxy {
 
   /// Writes a value over the body; its id stays, forces and accelerations are cleared.
   /// \throws std::invalid_argument on a field out of range, with nothing written
-  void store(const Body<Scalar>& body) const
-    requires(!IsConst)
-  {
+  void store(const Body<Scalar>& body) const requires(!IsConst) {
     validate(body, "body " + std::to_string(toInteger(id())));
     const Vector3<Scalar> zero = Vector3<Scalar>::Zero();
     position() = body.position;
@@ -114,15 +109,12 @@ class BasicBodyProxy {
     angularAcceleration() = zero;
     mass() = body.mass;
     radius() = body.radius;
-    at(fields::InertiaFactor{}) =
-        body.inertia ? *body.inertia / (body.mass * body.radius * body.radius) : homogeneousFactor();
+    at(fields::InertiaFactor{}) = detail::inertiaFactor(body);
     at(fields::Flags{}) = body.fixed ? static_cast<std::uint32_t>(BodyFlag::Fixed) : 0U;
     setMaterial(body.material);
   }
 
  private:
-  static Scalar homogeneousFactor() { return Scalar(2) / Scalar(5); }
-
   template <class F>
   decltype(auto) at(F field) const {
     return storage_->at(field, index_);

@@ -7,6 +7,7 @@
 #include <gravel/bodies/fields.hpp>
 #include <gravel/bodies/views.hpp>
 
+#include <span>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -15,9 +16,10 @@ namespace gravel {
 
 namespace detail {
 
-/// Column c of body i stands at c * capacity + i.
+/// Column c of body i stands at c * capacity + i. The capacity is an odd multiple of 16: a power of two would
+/// put all columns of a body into the same few sets of a cache.
 struct SoAMapping {
-  static std::size_t roundUp(std::size_t n) { return (n + 15) / 16 * 16; }
+  static std::size_t roundUp(std::size_t n) { return ((n + 15) / 16 | 1U) * 16; }
   static std::size_t offset(std::size_t column, std::size_t i, std::size_t capacity) {
     return column * capacity + i;
   }
@@ -174,33 +176,43 @@ struct AoSoA {
 };
 
 /// A storage of bodies: `size()`, `resize(n)` and `at(field, i)` for every field of `RealFields` and
-/// `IntegerFields`. To bind another simulator's arrays without a copy, derive from one of the storages above
-/// and overload `at` for the fields that those arrays hold (docs/concepts.md, "Your own storage").
+/// `IntegerFields`; `reserve(n)` and `swap(i, j)` are used where they exist. Without `swap`, bodies are moved
+/// field by field, and whatever else a storage keeps of a body stays behind. To bind another simulator's
+/// arrays without a copy, derive from one of the storages above and overload `at` for the fields that those
+/// arrays hold (docs/concepts.md, "Your own storage").
 template <class T>
-concept BodyStorage =
-    Real<typename T::Scalar> && std::movable<T> && requires(T s, const T c, std::size_t i) {
-      { c.size() } -> std::convertible_to<std::size_t>;
-      s.resize(i);
-      Vector3<typename T::Scalar>(c.at(fields::Position{}, i));
-      Vector3<typename T::Scalar>(c.at(fields::Velocity{}, i));
-      Vector3<typename T::Scalar>(c.at(fields::AngularVelocity{}, i));
-      Quaternion<typename T::Scalar>(c.at(fields::Orientation{}, i));
-      Vector3<typename T::Scalar>(c.at(fields::Force{}, i));
-      Vector3<typename T::Scalar>(c.at(fields::Torque{}, i));
-      Vector3<typename T::Scalar>(c.at(fields::Acceleration{}, i));
-      Vector3<typename T::Scalar>(c.at(fields::AngularAcceleration{}, i));
-      { c.at(fields::Mass{}, i) } -> std::convertible_to<typename T::Scalar>;
-      { c.at(fields::Radius{}, i) } -> std::convertible_to<typename T::Scalar>;
-      { c.at(fields::InertiaFactor{}, i) } -> std::convertible_to<typename T::Scalar>;
-      { c.at(fields::Id{}, i) } -> std::convertible_to<std::uint64_t>;
-      { c.at(fields::Material{}, i) } -> std::convertible_to<std::uint32_t>;
-      { c.at(fields::Flags{}, i) } -> std::convertible_to<std::uint32_t>;
-      s.at(fields::Position{}, i) = Vector3<typename T::Scalar>();
-      s.at(fields::Velocity{}, i) = Vector3<typename T::Scalar>();
-      s.at(fields::Orientation{}, i) = Quaternion<typename T::Scalar>();
-      s.at(fields::Mass{}, i) = typename T::Scalar(1);
-      s.at(fields::Id{}, i) = std::uint64_t{0};
-    };
+concept BodyStorage = Real<typename T::Scalar> && std::movable<T> && requires(T s, const T c, std::size_t i) {
+  { c.size() } -> std::convertible_to<std::size_t>;
+  s.resize(i);
+  Vector3<typename T::Scalar>(c.at(fields::Position{}, i));
+  Vector3<typename T::Scalar>(c.at(fields::Velocity{}, i));
+  Vector3<typename T::Scalar>(c.at(fields::AngularVelocity{}, i));
+  Quaternion<typename T::Scalar>(c.at(fields::Orientation{}, i));
+  Vector3<typename T::Scalar>(c.at(fields::Force{}, i));
+  Vector3<typename T::Scalar>(c.at(fields::Torque{}, i));
+  Vector3<typename T::Scalar>(c.at(fields::Acceleration{}, i));
+  Vector3<typename T::Scalar>(c.at(fields::AngularAcceleration{}, i));
+  { c.at(fields::Mass{}, i) } -> std::convertible_to<typename T::Scalar>;
+  { c.at(fields::Radius{}, i) } -> std::convertible_to<typename T::Scalar>;
+  { c.at(fields::InertiaFactor{}, i) } -> std::convertible_to<typename T::Scalar>;
+  { c.at(fields::Id{}, i) } -> std::convertible_to<std::uint64_t>;
+  { c.at(fields::Material{}, i) } -> std::convertible_to<std::uint32_t>;
+  { c.at(fields::Flags{}, i) } -> std::convertible_to<std::uint32_t>;
+  s.at(fields::Position{}, i) = Vector3<typename T::Scalar>();
+  s.at(fields::Velocity{}, i) = Vector3<typename T::Scalar>();
+  s.at(fields::AngularVelocity{}, i) = Vector3<typename T::Scalar>();
+  s.at(fields::Orientation{}, i) = Quaternion<typename T::Scalar>();
+  s.at(fields::Force{}, i) = Vector3<typename T::Scalar>();
+  s.at(fields::Torque{}, i) = Vector3<typename T::Scalar>();
+  s.at(fields::Acceleration{}, i) = Vector3<typename T::Scalar>();
+  s.at(fields::AngularAcceleration{}, i) = Vector3<typename T::Scalar>();
+  s.at(fields::Mass{}, i) = typename T::Scalar(1);
+  s.at(fields::Radius{}, i) = typename T::Scalar(1);
+  s.at(fields::InertiaFactor{}, i) = typename T::Scalar(1);
+  s.at(fields::Id{}, i) = std::uint64_t{0};
+  s.at(fields::Material{}, i) = std::uint32_t{0};
+  s.at(fields::Flags{}, i) = std::uint32_t{0};
+};
 
 namespace detail {
 
@@ -221,6 +233,32 @@ void copyBody(To& to, std::size_t toIndex, const From& from, std::size_t fromInd
     auto&& target = to.at(field, toIndex);
     target = from.at(field, fromIndex);
   });
+}
+
+/// Puts body order[i] at i, for all i at once. Memory is allocated before anything moves.
+template <class Storage>
+void permute(Storage& storage, std::span<const std::size_t> order) {
+  if constexpr (requires(std::size_t i) { storage.swap(i, i); }) {
+    std::vector<std::size_t> at(order.begin(), order.end());  // at[i]: where the body for i stands
+    for (std::size_t start = 0; start < at.size(); ++start) {
+      std::size_t i = start;
+      while (at[i] != start) {
+        const std::size_t next = std::exchange(at[i], i);
+        storage.swap(i, next);
+        i = next;
+      }
+      at[i] = i;
+    }
+  } else {
+    typename SoA::template Storage<typename Storage::Scalar> copy;
+    copy.resize(order.size());
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      copyBody(copy, i, std::as_const(storage), order[i]);
+    }
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      copyBody(storage, i, std::as_const(copy), i);
+    }
+  }
 }
 
 }  // namespace detail

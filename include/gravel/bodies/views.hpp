@@ -56,15 +56,11 @@ class BasicQuaternionView : public Eigen::QuaternionBase<BasicQuaternionView<S, 
   BasicQuaternionView(const BasicQuaternionView&) = default;
 
   template <class Derived>
-  BasicQuaternionView& operator=(const Eigen::QuaternionBase<Derived>& other)
-    requires(!IsConst)
-  {
+  BasicQuaternionView& operator=(const Eigen::QuaternionBase<Derived>& other) requires(!IsConst) {
     coeffs_ = other.coeffs();
     return *this;
   }
-  BasicQuaternionView& operator=(const BasicQuaternionView& other)
-    requires(!IsConst)
-  {
+  BasicQuaternionView& operator=(const BasicQuaternionView& other) requires(!IsConst) {
     coeffs_ = other.coeffs();
     return *this;
   }

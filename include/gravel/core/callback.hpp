@@ -21,11 +21,16 @@ class Callback<R(Args...)> {
   Callback() = default;
 
   template <class F>
-    requires(!std::same_as<std::remove_cvref_t<F>, Callback> && std::is_invocable_r_v<R, F&, Args...>)
+    requires(!std::same_as<std::remove_cvref_t<F>, Callback> &&
+             std::is_invocable_r_v<R, std::decay_t<F>&, Args...>)
   Callback(F&& f)  // NOLINT(bugprone-forwarding-reference-overload,google-explicit-constructor)
-      : target_(std::make_shared<std::remove_cvref_t<F>>(std::forward<F>(f))),
+      : target_(std::make_shared<std::decay_t<F>>(std::forward<F>(f))),
         call_([](void* target, Args... args) -> R {
-          return (*static_cast<std::remove_cvref_t<F>*>(target))(std::forward<Args>(args)...);
+          if constexpr (std::is_void_v<R>) {
+            (*static_cast<std::decay_t<F>*>(target))(std::forward<Args>(args)...);
+          } else {
+            return (*static_cast<std::decay_t<F>*>(target))(std::forward<Args>(args)...);
+          }
         }) {}
 
   explicit operator bool() const { return call_ != nullptr; }

@@ -5,19 +5,18 @@
 
 #include <gravel/core/types.hpp>
 
-#include <cstdio>
+#include <charconv>
 #include <stdexcept>
 #include <string>
 
 namespace gravel::detail {
 
-/// The shortest decimal form that still tells two doubles apart in a message.
+/// The shortest decimal form that reads back as x: a value just out of range does not look like the limit.
 template <Real Scalar>
 inline std::string formatReal(const Scalar& x) {
   if constexpr (std::is_floating_point_v<Scalar>) {
     char text[64];
-    std::snprintf(text, sizeof text, "%.9Lg", static_cast<long double>(x));
-    return text;
+    return {text, std::to_chars(text, text + sizeof text, x).ptr};
   } else if constexpr (requires { static_cast<double>(x); }) {
     return formatReal(static_cast<double>(x));
   } else if constexpr (requires { static_cast<double>(x.value()); }) {
@@ -37,7 +36,8 @@ inline std::string formatVector(const Eigen::DenseBase<Derived>& v) {
 }
 
 /// "gravel: <subject> is <value>; allowed: <range>"
-inline std::string faultText(const std::string& subject, const std::string& value, const std::string& allowed) {
+inline std::string faultText(const std::string& subject, const std::string& value,
+                             const std::string& allowed) {
   return "gravel: " + subject + " is " + value + "; allowed: " + allowed;
 }
 
@@ -46,7 +46,7 @@ inline std::string faultText(const std::string& subject, const std::string& valu
   throw std::invalid_argument(faultText(subject, value, allowed));
 }
 
-/// A closed range of a setting; `unbounded` ends stand for "any finite number".
+/// A closed range of a setting; what is not finite is never in it, so an infinite end is an open one.
 template <Real Scalar>
 struct Range {
   Scalar low;
@@ -58,15 +58,8 @@ struct Range {
 
 template <Real Scalar>
 inline Range<Scalar> anyFinite() {
-  return {Scalar(std::numeric_limits<double>::lowest()), Scalar(std::numeric_limits<double>::max()), "finite"};
-}
-template <>
-inline Range<float> anyFinite<float>() {
-  return {std::numeric_limits<float>::lowest(), std::numeric_limits<float>::max(), "finite"};
-}
-template <>
-inline Range<long double> anyFinite<long double>() {
-  return {std::numeric_limits<long double>::lowest(), std::numeric_limits<long double>::max(), "finite"};
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  return {Scalar(-infinity), Scalar(infinity), "finite"};
 }
 
 template <Real Scalar>

@@ -12,8 +12,8 @@ namespace gravel {
 
 /// Bodies a tile: a cache line of the built-in scalars. One for other types, which have no packets.
 template <Real Scalar>
-inline constexpr int laneWidth = std::is_same_v<Scalar, float>    ? 16
-                                 : std::is_same_v<Scalar, double> ? 8
+inline constexpr int laneWidth = std::is_same_v<Scalar, float>      ? 16
+                                 : std::is_same_v<Scalar, double>   ? 8
                                  : std::is_floating_point_v<Scalar> ? 4
                                                                     : 1;
 

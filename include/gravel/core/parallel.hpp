@@ -10,6 +10,8 @@
 #include <cstddef>
 #include <exception>
 #include <limits>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #ifdef _OPENMP
@@ -55,10 +57,23 @@ class FirstError {
   std::exception_ptr error_;
 };
 
+/// [0, n) in consecutive pieces of `size`, the last one shorter; a size of 0 counts as 1. No n or size
+/// overflows.
+struct Chunks {
+  std::size_t n;
+  std::size_t size;
+
+  Chunks(std::size_t total, std::size_t chunk) : n(total), size(std::max<std::size_t>(chunk, 1)) {}
+  std::size_t count() const { return n / size + (n % size != 0 ? 1 : 0); }
+  std::size_t begin(std::size_t c) const { return c * size; }
+  std::size_t end(std::size_t c) const { return begin(c) + std::min(size, n - begin(c)); }
+};
+
 }  // namespace detail
 
 /// Calls f(c) for c = 0 … count-1, shared between threads in any order; a single thread, and no parallel
-/// region at all, when there is just one chunk or one thread.
+/// region at all, when there is just one chunk or one thread. If some calls throw, the exception of the
+/// lowest c among them comes out; which of the later calls were still made is not fixed.
 template <class F>
 void parallelForTasks(std::size_t count, F&& f) {
   if (count <= 1 || threadCount() == 1) {
@@ -82,11 +97,11 @@ void parallelForTasks(std::size_t count, F&& f) {
 #endif
 }
 
-/// Calls f(begin, end) for consecutive chunks of [0, n).
+/// Calls f(begin, end) for consecutive chunks of [0, n), `chunk` long but for the last.
 template <class F>
 void parallelForChunks(std::size_t n, std::size_t chunk, F&& f) {
-  const std::size_t count = (n + chunk - 1) / chunk;
-  parallelForTasks(count, [&](std::size_t c) { f(c * chunk, std::min(n, (c + 1) * chunk)); });
+  const detail::Chunks chunks(n, chunk);
+  parallelForTasks(chunks.count(), [&](std::size_t c) { f(chunks.begin(c), chunks.end(c)); });
 }
 
 /// Calls f(i) for i = 0 … n-1. `grain` is how many calls are worth a chunk of their own: about a
@@ -104,13 +119,15 @@ void parallelFor(std::size_t n, std::size_t grain, F&& f) {
 /// of threads, and a rounding error that grows with the logarithm of the number of chunks (Higham 1993).
 template <class T, class F>
 T orderedSum(std::size_t n, std::size_t chunk, const T& zero, F&& f) {
-  const std::size_t count = (n + chunk - 1) / chunk;
+  static_assert(!std::is_same_v<T, bool>,
+                "gravel: orderedSum of bool: sum a number");  // vector<bool> would race
+  const detail::Chunks chunks(n, chunk);
+  const std::size_t count = chunks.count();
   if (count == 0) {
     return zero;
   }
   std::vector<T> parts(count, zero);
-  parallelForTasks(count,
-                   [&](std::size_t c) { parts[c] = f(c * chunk, std::min(n, (c + 1) * chunk)); });
+  parallelForTasks(count, [&](std::size_t c) { parts[c] = f(chunks.begin(c), chunks.end(c)); });
   for (std::size_t width = 1; width < count; width *= 2) {
     for (std::size_t c = 0; c + width < count; c += 2 * width) {
       parts[c] += parts[c + width];

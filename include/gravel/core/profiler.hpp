@@ -29,8 +29,8 @@ inline constexpr std::size_t phaseCount = 10;
 
 constexpr const char* phaseName(Phase phase) {
   constexpr std::array<const char*, phaseCount> names{
-      "integration",  "neighbour search",      "narrow phase", "colouring", "contact solve",
-      "pos. correction", "gravity",            "damping",      "time step", "diagnostics"};
+      "integration",     "neighbour search", "narrow phase", "colouring", "contact solve",
+      "pos. correction", "gravity",          "damping",      "time step", "diagnostics"};
   return names[static_cast<std::size_t>(phase)];
 }
 
@@ -85,8 +85,7 @@ class Profiler {
       const Entry& entry = entries_[p];
       std::fprintf(out, "%-18s %12.6f %6.1f%% %10llu %10llu  %s\n", phaseName(static_cast<Phase>(p)),
                    entry.seconds, total > 0.0 ? 100.0 * entry.seconds / total : 0.0,
-                   static_cast<unsigned long long>(entry.calls),
-                   static_cast<unsigned long long>(entry.skips),
+                   static_cast<unsigned long long>(entry.calls), static_cast<unsigned long long>(entry.skips),
                    entry.reason != nullptr ? entry.reason : "-");
     }
     std::fprintf(out, "%-18s %12.6f\n", "total", total);

@@ -1,8 +1,10 @@
 #pragma once
 
 /// \file
-/// Random numbers that are a function of (seed, stream, counter): the same on every machine, in any order,
-/// with any number of threads, and without the unspecified algorithms of the standard distributions.
+/// Random numbers that are a function of (seed, stream, counter): the same in any order, with any number of
+/// threads, and without the unspecified algorithms of the standard distributions. `bits` and
+/// `uniform(counter)` are the same on every machine; the rest up to the last bits of its cos and log and of
+/// fused multiplications.
 
 #include <gravel/core/types.hpp>
 
@@ -23,7 +25,7 @@ class CounterRandom {
     return static_cast<double>(bits(counter) >> 11U) * 0x1p-53;
   }
 
-  /// Uniform in [low, high).
+  /// Uniform from low to high; high itself only where rounding reaches it.
   constexpr double uniform(std::uint64_t counter, double low, double high) const {
     return low + (high - low) * uniform(counter);
   }

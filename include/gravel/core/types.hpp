@@ -16,32 +16,40 @@
 
 namespace gravel {
 
+namespace detail {
+
+using std::sqrt;
+
+/// A square root found as Eigen finds it: std::sqrt or one beside the type. Spelled in the signature, so that
+/// a type without one fails a concept instead of the compilation.
+template <class T>
+auto rootOf(const T& x) -> decltype(T(sqrt(x)));
+
+}  // namespace detail
+
 /// A scalar that gravel can compute with: float, double, long double, and any type with the arithmetic,
 /// comparisons and `sqrt` of a real number (dual numbers, multiprecision). A type that is not built in
 /// takes the plain loops in place of the vector lanes; it also needs `Eigen::NumTraits`.
 template <class T>
-concept Real = !std::is_integral_v<T> && std::copyable<T> && std::constructible_from<T, double> &&
+concept Real = !std::is_integral_v<T> && std::semiregular<T> && std::constructible_from<T, double> &&
                requires(T a, const T b, const T c) {
-                 { b + c } -> std::convertible_to<T>;
-                 { b - c } -> std::convertible_to<T>;
-                 { b * c } -> std::convertible_to<T>;
-                 { b / c } -> std::convertible_to<T>;
-                 { -b } -> std::convertible_to<T>;
-                 { a += b };
-                 { a -= b };
-                 { a *= b };
-                 { a /= b };
-                 { b < c } -> std::convertible_to<bool>;
-                 { b <= c } -> std::convertible_to<bool>;
-                 { b > c } -> std::convertible_to<bool>;
-                 { b >= c } -> std::convertible_to<bool>;
-                 { b == c } -> std::convertible_to<bool>;
-                 typename Eigen::NumTraits<T>::Real;
-                 [](const T& x) {
-                   using std::sqrt;
-                   return T(sqrt(x));
-                 }(b);
-               };
+  { b + c } -> std::convertible_to<T>;
+  { b - c } -> std::convertible_to<T>;
+  { b* c } -> std::convertible_to<T>;
+  { b / c } -> std::convertible_to<T>;
+  { -b } -> std::convertible_to<T>;
+  {a += b};
+  {a -= b};
+  {a *= b};
+  {a /= b};
+  { b < c } -> std::convertible_to<bool>;
+  { b <= c } -> std::convertible_to<bool>;
+  { b > c } -> std::convertible_to<bool>;
+  { b >= c } -> std::convertible_to<bool>;
+  { b == c } -> std::convertible_to<bool>;
+  typename Eigen::NumTraits<T>::Real;
+  detail::rootOf(b);
+};
 
 template <Real Scalar>
 using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
@@ -63,7 +71,13 @@ constexpr std::uint64_t toInteger(BodyId id) { return static_cast<std::uint64_t>
 /// Circle constant in any scalar.
 template <Real Scalar>
 inline Scalar pi() {
-  return Scalar(3.141592653589793238462643383279502884L);
+  if constexpr (std::is_floating_point_v<Scalar>) {
+    return static_cast<Scalar>(3.141592653589793238462643383279502884L);
+  } else if constexpr (requires(const Scalar one) { Scalar(atan(one)); }) {
+    return Scalar(Scalar(4) * Scalar(atan(Scalar(1))));  // in the type's own precision
+  } else {
+    return Scalar(3.141592653589793);
+  }
 }
 
 /// True unless x is a NaN or an infinity. For a type that is not built in: x - x is 0 exactly then.
