@@ -1,5 +1,5 @@
-// A ball falls on a plane. The second file uses the same headers, so that a definition that is not inline fails
-// to link.
+// A ball falls on a plane. The second file uses the same headers, so that a definition that is not inline
+// fails to link.
 #include <gravel/gravel.hpp>
 
 #include <cstdio>
