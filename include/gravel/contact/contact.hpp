@@ -1,0 +1,110 @@
+#pragma once
+
+/// \file
+/// A contact: where two bodies touch, and what their surfaces are.
+
+#include <gravel/contact/impulses.hpp>
+#include <gravel/contact/material.hpp>
+#include <gravel/core/random.hpp>
+
+#include <algorithm>
+#include <optional>
+#include <vector>
+
+namespace gravel {
+
+/// `Contact::second` of a contact with a boundary.
+inline constexpr std::uint32_t staticPartner = std::numeric_limits<std::uint32_t>::max();
+
+/// Second key of a contact with the boundary of that index; larger than any body's id below 2^63.
+constexpr std::uint64_t boundaryKey(std::uint64_t boundary) { return boundary | (std::uint64_t{1} << 63U); }
+
+/// Two bodies, or a body and a boundary, that touch. Named by ids, so that it is recognised in the next step
+/// whatever the bodies' indices are by then; lists are sorted by (key1, key2).
+template <Real Scalar>
+struct Contact {
+  std::uint32_t first;        ///< index of the body of the smaller id
+  std::uint32_t second;       ///< index of the other, or `staticPartner`
+  std::uint64_t key1;         ///< id of the first
+  std::uint64_t key2;         ///< id of the second, or `boundaryKey(index)`
+  Vector3<Scalar> normal;     ///< unit vector from the first to the second
+  Scalar gap;                 ///< [m] between the surfaces, < 0 is overlap
+  Scalar arm1;                ///< [m] centre of the first to the contact along the normal
+  Scalar arm2;                ///< [m] contact to the centre of the second
+  Material<Scalar> material;  ///< of the pair, mixed
+  /// [m s^-1] to be added to the velocity of the second: of its image in a sheared domain, of a moving
+  /// boundary.
+  Vector3<Scalar> drift = Vector3<Scalar>::Zero();
+
+  /// True if a comes before b in lists.
+  friend bool keysBefore(const Contact& a, const Contact& b) {
+    return a.key1 != b.key1 ? a.key1 < b.key1 : a.key2 < b.key2;
+  }
+};
+
+/// A boundary: n.x >= offset is free.
+template <Real Scalar>
+struct HalfSpace {
+  Vector3<Scalar> normal;  ///< unit vector into the free side
+  Scalar offset;           ///< [m]
+  Material<Scalar> material{};
+};
+
+/// Where two surfaces stand: normal from 1 to 2, gap < 0 for overlap, arms from the centres.
+template <Real Scalar>
+struct Touch {
+  Vector3<Scalar> normal;
+  Scalar distance;
+  Scalar gap;
+  Scalar arm1;
+  Scalar arm2;
+};
+
+namespace detail {
+
+/// A direction for two centres at one point: a function of the two ids, reversed when they are exchanged.
+template <Real Scalar>
+Vector3<Scalar> directionOfIds(std::uint64_t id1, std::uint64_t id2) {
+  const std::uint64_t low = id1 < id2 ? id1 : id2;
+  const std::uint64_t high = id1 < id2 ? id2 : id1;
+  const Vector3<double> d = CounterRandom(low, high).direction(0);
+  const Vector3<Scalar> n = safeUnit(Vector3<Scalar>(Scalar(d[0]), Scalar(d[1]), Scalar(d[2])));
+  return id1 <= id2 ? n : Vector3<Scalar>(-n);
+}
+
+}  // namespace detail
+
+/// Two spheres with the separation r_12 = x2 - x1; nothing unless |r_12| < r1 + r2 + margin. The arms share
+/// the distance in proportion of the radii: arm1 + arm2 = |r_12| keeps the angular momentum of a blow to
+/// rounding. Where the centres fall together (at most epsilon apart, and no more than the rounding of the
+/// radii) the normal is a function of the two ids.
+template <Real Scalar>
+std::optional<Touch<Scalar>> sphereSphere(const Vector3<Scalar>& r_12, const Scalar& r1, const Scalar& r2,
+                                          std::uint64_t id1, std::uint64_t id2, const Scalar& epsilon,
+                                          const Scalar& margin = Scalar(0)) {
+  const Scalar reach = r1 + r2;
+  const Scalar distance = detail::safeNorm(r_12);
+  if (!(reach > Scalar(0)) || !(distance < reach + margin)) {
+    return std::nullopt;
+  }
+  const Scalar near = std::min(epsilon, Scalar(Scalar(16) * Eigen::NumTraits<Scalar>::epsilon() * reach));
+  const bool coincident = !(distance > Scalar(0)) || distance <= near;
+  const Scalar arm1 = distance * (r1 / reach);
+  return Touch<Scalar>{coincident ? detail::directionOfIds<Scalar>(id1, id2) : detail::safeUnit(r_12),
+                       distance, distance - reach, arm1, distance - arm1};
+}
+
+/// A sphere and a half-space; nothing unless the gap is below margin. The arm is the radius. A centre deep
+/// inside is pushed out all the same.
+template <Real Scalar>
+std::optional<Touch<Scalar>> sphereHalfSpace(const Vector3<Scalar>& x, const Scalar& radius,
+                                             const Vector3<Scalar>& normal, const Scalar& offset,
+                                             const Scalar& margin = Scalar(0)) {
+  const Scalar distance = normal.dot(x) - offset;
+  if (!(radius > Scalar(0)) || !(distance < radius + margin)) {
+    return std::nullopt;
+  }
+  return Touch<Scalar>{Vector3<Scalar>(-normal), distance, distance - radius, radius, Scalar(0)};
+}
+
+}  // namespace gravel

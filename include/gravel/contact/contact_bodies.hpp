@@ -1,0 +1,74 @@
+#pragma once
+
+/// \file
+/// What contacts need of bodies: `Bodies` in any layout has it, and so have a user's own arrays.
+
+#include <gravel/bodies/bodies.hpp>
+
+#include <span>
+
+namespace gravel {
+
+/// Columns by name, each `column[i]` for i below `size()`.
+template <class T>
+concept ContactBodies = requires(T& bodies, const T& constBodies, std::size_t i) {
+  { constBodies.size() } -> std::convertible_to<std::size_t>;
+  bodies.positions()[i];
+  bodies.velocities()[i];
+  bodies.angularVelocities()[i];
+  constBodies.accelerations()[i];
+  constBodies.masses()[i];
+  constBodies.radii()[i];
+  constBodies.inertiaFactors()[i];
+  constBodies.flags()[i];
+  constBodies.ids()[i];
+  constBodies.materials()[i];
+};
+
+/// A user's own arrays, seen as bodies; all of one length. Owns nothing.
+template <Real S = double>
+struct ContactArrays {
+  std::span<Vector3<S>> position;
+  std::span<Vector3<S>> velocity;
+  std::span<Vector3<S>> angularVelocity;
+  std::span<const Vector3<S>> acceleration;  ///< by fields and gravity, of this step
+  std::span<const S> mass;
+  std::span<const S> radius;
+  std::span<const S> inertiaFactor;     ///< k in I = k m r^2
+  std::span<const std::uint32_t> flag;  ///< bits of BodyFlag
+  std::span<const std::uint64_t> id;    ///< all different
+  std::span<const std::uint32_t> material;
+
+  std::size_t size() const { return position.size(); }
+  auto positions() const { return position; }
+  auto velocities() const { return velocity; }
+  auto angularVelocities() const { return angularVelocity; }
+  auto accelerations() const { return acceleration; }
+  auto masses() const { return mass; }
+  auto radii() const { return radius; }
+  auto inertiaFactors() const { return inertiaFactor; }
+  auto flags() const { return flag; }
+  auto ids() const { return id; }
+  auto materials() const { return material; }
+};
+
+namespace detail {
+
+/// True for a body that contacts can move: not fixed, and with a mass.
+template <class B>
+bool isMovable(const B& bodies, std::size_t i) {
+  using S = std::remove_cvref_t<decltype(bodies.masses()[i])>;
+  return (bodies.flags()[i] & static_cast<std::uint32_t>(BodyFlag::Fixed)) == 0 && bodies.masses()[i] > S(0);
+}
+
+/// True for a point without mass, which feels gravity and touches nothing.
+template <class B>
+bool isTracer(const B& bodies, std::size_t i) {
+  using S = std::remove_cvref_t<decltype(bodies.masses()[i])>;
+  return (bodies.flags()[i] & static_cast<std::uint32_t>(BodyFlag::Fixed)) == 0 &&
+         !(bodies.masses()[i] > S(0));
+}
+
+}  // namespace detail
+
+}  // namespace gravel

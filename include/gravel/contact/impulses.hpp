@@ -1,0 +1,118 @@
+#pragma once
+
+/// \file
+/// One blow between two spheres in closed form: pure functions of numbers. Sign convention: the normal n
+/// points from body 1 to body 2, v_n = n.(v2 - v1) < 0 is approach, the impulse on body 2 is +J, on 1 -J.
+///
+/// The spin of a body of radius r enters as the speed of its surface, s = r w, and its inertia k m r^2 as
+/// the factor k: radii cancel, so that nothing underflows for dust. With the arms a_i from the centres to the
+/// contact and c_i = a_i / r_i the slip is the tangential part of
+///   u = v2 - v1 - (c1 s1 + c2 s2) x n,
+/// and a tangential impulse J changes it by J (1/m1 (1 + c1^2/k1) + 1/m2 (1 + c2^2/k2)): for homogeneous
+/// spheres (k = 2/5, c = 1) by 7/2 J/m*. Normal and tangential impulse do not feel each other, hence each is
+/// exact on its own.
+
+#include <gravel/core/types.hpp>
+
+namespace gravel {
+
+namespace detail {
+
+/// |v| without overflow or underflow of the squares.
+template <Real Scalar>
+Scalar safeNorm(const Vector3<Scalar>& v) {
+  using std::sqrt;
+  const Scalar sq = v.squaredNorm();
+  if constexpr (std::is_floating_point_v<Scalar>) {
+    constexpr Scalar tiny = std::numeric_limits<Scalar>::min() / std::numeric_limits<Scalar>::epsilon();
+    if (!(sq > tiny) || !(sq < std::numeric_limits<Scalar>::max())) {
+      const Scalar largest = v.cwiseAbs().maxCoeff();
+      if (!(largest > Scalar(0)) || !std::isfinite(largest)) {
+        return largest;
+      }
+      int exponent = 0;
+      (void)std::frexp(largest, &exponent);
+      const Vector3<Scalar> scaled(std::ldexp(v[0], -exponent), std::ldexp(v[1], -exponent),
+                                   std::ldexp(v[2], -exponent));
+      return std::ldexp(std::sqrt(scaled.squaredNorm()), exponent);
+    }
+  }
+  return Scalar(sqrt(sq));
+}
+
+/// v / |v|; v itself where it is zero or not finite.
+template <Real Scalar>
+Vector3<Scalar> safeUnit(const Vector3<Scalar>& v) {
+  const Scalar length = safeNorm(v);
+  if (!(length > Scalar(0))) {
+    return v;
+  }
+  if constexpr (std::is_floating_point_v<Scalar>) {
+    if (length < std::numeric_limits<Scalar>::min() / std::numeric_limits<Scalar>::epsilon() ||
+        !std::isfinite(length)) {  // v / length would lose digits: bring it to order one first
+      int exponent = 0;
+      (void)std::frexp(v.cwiseAbs().maxCoeff(), &exponent);
+      const Vector3<Scalar> scaled(std::ldexp(v[0], -exponent), std::ldexp(v[1], -exponent),
+                                   std::ldexp(v[2], -exponent));
+      return scaled / std::sqrt(scaled.squaredNorm());
+    }
+  }
+  return v / length;
+}
+
+}  // namespace detail
+
+/// How two bodies share a change of their relative velocity: first + second = 1, by inverse mass. Both 0 if
+/// neither moves. `effective` is m* = 1/(1/m1 + 1/m2).
+template <Real Scalar>
+struct MassShares {
+  Scalar first;
+  Scalar second;
+  Scalar effective;
+};
+
+/// \param m1,m2 masses [kg] > 0 of movable bodies; any value of others
+template <Real Scalar>
+MassShares<Scalar> massShares(const Scalar& m1, bool movable1, const Scalar& m2, bool movable2) {
+  if (movable1 && movable2) {
+    // From the ratio of the smaller to the larger: m1 + m2 and m1 m2 may leave the range of numbers.
+    const bool firstLarger = m1 > m2;
+    const Scalar ratio = firstLarger ? m2 / m1 : m1 / m2;
+    const Scalar light = Scalar(1) / (Scalar(1) + ratio);
+    const Scalar heavy = ratio / (Scalar(1) + ratio);
+    return firstLarger ? MassShares<Scalar>{heavy, light, m2 * light}
+                       : MassShares<Scalar>{light, heavy, m1 * light};
+  }
+  return {Scalar(movable1 ? 1 : 0), Scalar(movable2 ? 1 : 0), movable1 ? m1 : movable2 ? m2 : Scalar(0)};
+}
+
+/// [N s] J_n = (1 + e) m* u_n for the approach speed u_n = -v_n > 0; none for a pair that separates.
+template <Real Scalar>
+Scalar normalImpulse(const Scalar& effectiveMass, const Scalar& v_n, const Scalar& restitution) {
+  return v_n < Scalar(0) ? effectiveMass * (-v_n - restitution * v_n) : Scalar(0);
+}
+
+/// Clamps a tangential impulse to Coulomb's cone: kept while it is at most mu_s J_n (it sticks), else cut to
+/// mu_k J_n in its own direction (it slides).
+template <Real Scalar>
+Vector3<Scalar> clampToCone(const Vector3<Scalar>& sticking, const Scalar& jn, const Scalar& mu_s,
+                            const Scalar& mu_k) {
+  if (!(jn > Scalar(0))) {
+    return Vector3<Scalar>::Zero();
+  }
+  return detail::safeNorm(sticking) <= mu_s * jn ? sticking
+                                                 : Vector3<Scalar>((mu_k * jn) * detail::safeUnit(sticking));
+}
+
+/// [N s] tangential impulse on body 2 of one blow: -(1 + b0) m_t v_t if that sticks, else mu_k J_n against
+/// the slip (Walton's model; Chung & Ooi 2011, Granular Matter 13, 643).
+/// \param tangentialMass m_t = 1/(1/m1 (1 + c1^2/k1) + 1/m2 (1 + c2^2/k2)), see the top of this file
+/// \param v_t slip [m s^-1] of 2 over 1 at the contact, in the tangent plane
+template <Real Scalar>
+Vector3<Scalar> tangentialImpulse(const Scalar& tangentialMass, const Vector3<Scalar>& v_t, const Scalar& jn,
+                                  const Scalar& mu_s, const Scalar& mu_k, const Scalar& b0) {
+  const Vector3<Scalar> sticking = -((Scalar(1) + b0) * tangentialMass) * v_t;
+  return clampToCone<Scalar>(sticking, jn, mu_s, mu_k);
+}
+
+}  // namespace gravel

@@ -1,0 +1,142 @@
+#pragma once
+
+/// \file
+/// From candidates to contacts: which pairs really touch, where, and with what surfaces.
+
+#include <gravel/contact/contact.hpp>
+#include <gravel/contact/contact_bodies.hpp>
+#include <gravel/core/parallel.hpp>
+#include <gravel/spatial/pair.hpp>
+
+#include <string>
+
+namespace gravel {
+
+/// Settings of a search for contacts.
+template <Real Scalar>
+struct NarrowPhaseSettings {
+  Scalar time = Scalar(0);     ///< [s], for a sheared domain
+  Scalar epsilon = Scalar(0);  ///< [m] centres closer than this (and than rounding) count as one point
+  Scalar margin = Scalar(0);   ///< [m] pairs with a gap below this are contacts too; 0 takes overlaps only
+};
+
+/// Turns candidate pairs and boundaries into the list of contacts, sorted by keys. Keeps its workspace from
+/// call to call. O(candidates + bodies x boundaries), shared between threads; the list is the same for any
+/// number of threads. A pair of two immovable bodies makes no contact, and neither does a tracer.
+template <Real S>
+class NarrowPhase {
+ public:
+  /// \param pairs candidates, sorted by ids (spatial/pair.hpp), of indices into `bodies`
+  /// \param materials surface of each MaterialId that occurs
+  /// \param boundaries half-spaces with unit normals; boundary b has the key boundaryKey(b)
+  /// \throws std::invalid_argument for a material id without an entry
+  template <ContactBodies B>
+  void find(std::span<const Pair> pairs, const B& bodies, const Domain<S>& domain,
+            std::span<const Material<S>> materials, std::span<const HalfSpace<S>> boundaries,
+            const NarrowPhaseSettings<S>& settings, std::vector<Contact<S>>& out) {
+    gather(pairs.size(), out, [&](std::size_t k, std::vector<Contact<S>>& part) {
+      appendPair(pairs[k], bodies, domain, materials, settings, part);
+    });
+    const auto pairContacts = static_cast<std::ptrdiff_t>(out.size());
+    if (boundaries.empty()) {
+      return;
+    }
+    gather(bodies.size(), boundaryContacts_, [&](std::size_t i, std::vector<Contact<S>>& part) {
+      appendBoundaries(i, bodies, materials, boundaries, settings, part);
+    });
+    const auto before = [](const Contact<S>& a, const Contact<S>& b) { return keysBefore(a, b); };
+    if (!std::is_sorted(boundaryContacts_.begin(), boundaryContacts_.end(), before)) {
+      std::sort(boundaryContacts_.begin(), boundaryContacts_.end(), before);
+    }
+    out.insert(out.end(), boundaryContacts_.begin(), boundaryContacts_.end());
+    std::inplace_merge(out.begin(), out.begin() + pairContacts, out.end(), before);
+  }
+
+ private:
+  static constexpr std::size_t chunk = 4096;
+
+  /// Calls append(k, part) for k = 0 … n-1 in chunks and joins the parts in order.
+  template <class Append>
+  void gather(std::size_t n, std::vector<Contact<S>>& out, Append&& append) {
+    const std::size_t chunks = (n + chunk - 1) / chunk;
+    if (parts_.size() < chunks) {
+      parts_.resize(chunks);
+    }
+    parallelForChunks(n, chunk, [&](std::size_t begin, std::size_t end) {
+      std::vector<Contact<S>>& part = parts_[begin / chunk];
+      part.clear();
+      for (std::size_t k = begin; k < end; ++k) {
+        append(k, part);
+      }
+    });
+    out.clear();
+    std::size_t total = 0;
+    for (std::size_t c = 0; c < chunks; ++c) {
+      total += parts_[c].size();
+    }
+    out.reserve(total);
+    for (std::size_t c = 0; c < chunks; ++c) {
+      out.insert(out.end(), parts_[c].begin(), parts_[c].end());
+    }
+  }
+
+  static const Material<S>& surface(std::span<const Material<S>> materials, std::uint32_t id) {
+    if (id >= materials.size()) {
+      detail::refuse("material of a body", std::to_string(id),
+                     "below the number of materials, " + std::to_string(materials.size()));
+    }
+    return materials[id];
+  }
+
+  template <class B>
+  static void appendPair(Pair pair, const B& bodies, const Domain<S>& domain,
+                         std::span<const Material<S>> materials, const NarrowPhaseSettings<S>& settings,
+                         std::vector<Contact<S>>& part) {
+    std::uint32_t i = pair.first;
+    std::uint32_t j = pair.second;
+    const S r_i = bodies.radii()[i];
+    const S r_j = bodies.radii()[j];
+    Vector3<S> r_ij = Vector3<S>(bodies.positions()[j]) - Vector3<S>(bodies.positions()[i]);
+    Vector3<S> drift = Vector3<S>::Zero();
+    domain.minimumImage(r_ij, drift, settings.time);
+    const S reach = r_i + r_j + settings.margin;
+    if (r_ij.cwiseAbs().maxCoeff() > reach) {
+      return;  // the common case, before anything else is loaded
+    }
+    const std::uint64_t id_i = bodies.ids()[i];
+    const std::uint64_t id_j = bodies.ids()[j];
+    const auto touch = sphereSphere<S>(r_ij, r_i, r_j, id_i, id_j, settings.epsilon, settings.margin);
+    if (!touch || detail::isTracer(bodies, i) || detail::isTracer(bodies, j) ||
+        !(detail::isMovable(bodies, i) || detail::isMovable(bodies, j))) {
+      return;
+    }
+    const std::uint32_t m_i = bodies.materials()[i];
+    const std::uint32_t m_j = bodies.materials()[j];
+    const Material<S>& surface_i = surface(materials, m_i);
+    part.push_back(Contact<S>{i, j, id_i, id_j, touch->normal, touch->gap, touch->arm1, touch->arm2,
+                              m_i == m_j ? surface_i : mix(surface_i, surface(materials, m_j)), drift});
+  }
+
+  template <class B>
+  static void appendBoundaries(std::size_t i, const B& bodies, std::span<const Material<S>> materials,
+                               std::span<const HalfSpace<S>> boundaries,
+                               const NarrowPhaseSettings<S>& settings, std::vector<Contact<S>>& part) {
+    const S radius = bodies.radii()[i];
+    for (std::size_t b = 0; b < boundaries.size(); ++b) {
+      const HalfSpace<S>& wall = boundaries[b];
+      const auto touch = sphereHalfSpace<S>(Vector3<S>(bodies.positions()[i]), radius, wall.normal,
+                                            wall.offset, settings.margin);
+      if (touch && detail::isMovable(bodies, i)) {
+        part.push_back(Contact<S>{static_cast<std::uint32_t>(i), staticPartner, bodies.ids()[i],
+                                  boundaryKey(b), touch->normal, touch->gap, touch->arm1, touch->arm2,
+                                  mix(surface(materials, bodies.materials()[i]), wall.material),
+                                  Vector3<S>::Zero()});
+      }
+    }
+  }
+
+  std::vector<std::vector<Contact<S>>> parts_;
+  std::vector<Contact<S>> boundaryContacts_;
+};
+
+}  // namespace gravel
