@@ -36,6 +36,7 @@ class BasicBodyProxy {
   decltype(auto) angularAcceleration() const { return at(fields::AngularAcceleration{}); }
   decltype(auto) mass() const { return at(fields::Mass{}); }
   decltype(auto) radius() const { return at(fields::Radius{}); }
+  decltype(auto) inertiaFactor() const { return at(fields::InertiaFactor{}); }
 
   BodyId id() const { return BodyId{at(fields::Id{})}; }
   std::size_t index() const { return index_; }
