@@ -1,0 +1,176 @@
+#pragma once
+
+/// \file
+/// The space in which bodies live: open, periodic, or shear-periodic (a patch of a disc in Hill's frame).
+
+#include <gravel/core/check.hpp>
+
+namespace gravel {
+
+enum class DomainKind { Open, Periodic, ShearPeriodic };
+
+namespace detail {
+
+/// The integer nearest to x; halves go away from zero, so that the result is odd in x.
+template <Real S>
+inline S nearestInteger(const S& x) {
+  if constexpr (std::is_floating_point_v<S>) {
+    return std::round(x);
+  } else {
+    // Written with comparisons alone: a user's scalar need not have round(). Exact for |x| < 2^53.
+    const bool negative = x < S(0);
+    S rest = negative ? S(-x) : x;
+    if (!(rest < S(9007199254740992.0))) {
+      return x;
+    }
+    double whole = 0.0;
+    for (double bit = 4503599627370496.0; bit >= 1.0; bit /= 2.0) {
+      if (rest >= S(bit)) {
+        rest -= S(bit);
+        whole += bit;
+      }
+    }
+    whole += rest >= S(0.5) ? 1.0 : 0.0;
+    return S(negative ? -whole : whole);
+  }
+}
+
+}  // namespace detail
+
+/// A periodic box is [-L/2, L/2) in each axis. In the shear-periodic box x points outward, y along the orbit;
+/// the unperturbed flow is v_y = -(3/2) Omega x, so the image one box further out in x lags by the sheared
+/// offset (3/2) Omega Lx t in y and by (3/2) Omega Lx in v_y (Wisdom & Tremaine 1988, AJ 95, 925).
+/// Bodies must be smaller than half a box: of each pair only the nearest image is looked at.
+template <Real S>
+class Domain {
+ public:
+  Domain() = default;
+
+  static Domain open() { return {}; }
+
+  /// \param lengths box edges [m], finite and > 0. \throws std::invalid_argument otherwise
+  static Domain periodic(const Vector3<S>& lengths) { return Domain(DomainKind::Periodic, lengths, S(0)); }
+
+  /// \param omega orbital frequency [s^-1], finite, of either sign. \throws std::invalid_argument otherwise
+  static Domain shearPeriodic(const Vector3<S>& lengths, S omega) {
+    return Domain(DomainKind::ShearPeriodic, lengths, omega);
+  }
+
+  DomainKind kind() const { return kind_; }
+  bool isOpen() const { return kind_ == DomainKind::Open; }
+  const Vector3<S>& lengths() const { return lengths_; }
+  S omega() const { return omega_; }
+
+  /// Speed [m s^-1] by which the image one box further out in x lags in y; 0 unless shear-periodic.
+  S shearSpeed() const { return S(1.5) * omega_ * lengths_[0]; }
+
+  /// Distance [m] by which that image lags in y at `time`, brought into [-Ly/2, Ly/2].
+  S shearOffset(const S& time) const {
+    if (kind_ != DomainKind::ShearPeriodic) {
+      return S(0);
+    }
+    return nearest(S(shearSpeed() * time), 1);
+  }
+
+  /// The shortest image of a separation; r itself in an open domain. Odd in r.
+  Vector3<S> minimumImage(const Vector3<S>& r, const S& time) const {
+    S boxes(0);
+    return shortest(r, time, boxes);
+  }
+
+  /// The same, with the relative velocity v that belongs to that image.
+  void minimumImage(Vector3<S>& r, Vector3<S>& v, const S& time) const {
+    S boxes(0);
+    r = shortest(r, time, boxes);
+    if (kind_ == DomainKind::ShearPeriodic) {
+      v[1] += boxes * shearSpeed();
+    }
+  }
+
+  /// Brings a body into the box, with the velocity that its image there has. Nothing in an open domain.
+  void wrap(Vector3<S>& x, Vector3<S>& v, const S& time) const {
+    if (kind_ == DomainKind::Open) {
+      return;
+    }
+    const S boxes = wrapAxis(x, 0);
+    if (kind_ == DomainKind::ShearPeriodic && !(boxes == S(0))) {
+      x[1] += boxes * shearOffset(time);
+      v[1] += boxes * shearSpeed();
+    }
+    wrapAxis(x, 1);
+    wrapAxis(x, 2);
+  }
+
+  friend bool operator==(const Domain& a, const Domain& b) {
+    return a.kind_ == b.kind_ && a.lengths_[0] == b.lengths_[0] && a.lengths_[1] == b.lengths_[1] &&
+           a.lengths_[2] == b.lengths_[2] && a.omega_ == b.omega_;
+  }
+
+ private:
+  Domain(DomainKind kind, const Vector3<S>& lengths, S omega)
+      : kind_(kind), lengths_(lengths), omega_(omega) {
+    constexpr const char* names[3] = {"length x of the domain", "length y of the domain",
+                                      "length z of the domain"};
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!isFinite(S(lengths[axis])) || !(lengths[axis] > S(0))) {
+        detail::refuse(names[axis], detail::formatReal(S(lengths[axis])), "finite, > 0");
+      }
+    }
+    if (!isFinite(omega)) {
+      detail::refuse("Omega of the domain", detail::formatReal(omega), "finite");
+    }
+  }
+
+  S nearest(const S& r, int axis) const {
+    return r - lengths_[axis] * detail::nearestInteger(S(r / lengths_[axis]));
+  }
+
+  /// `boxes`: how many boxes were taken off in x.
+  Vector3<S> shortest(const Vector3<S>& r, const S& time, S& boxes) const {
+    if (kind_ == DomainKind::Open) {
+      return r;
+    }
+    const S home = detail::nearestInteger(S(r[0] / lengths_[0]));
+    Vector3<S> best(r[0] - home * lengths_[0], nearest(r[1], 1), nearest(r[2], 2));
+    boxes = home;
+    if (kind_ == DomainKind::ShearPeriodic) {
+      // The lattice is oblique: where |r| is above half a box, a neighbour in x may be nearer.
+      const S offset = shearOffset(time);
+      best[1] = nearest(S(r[1] + home * offset), 1);
+      const S side = best[0] < S(0) ? S(-1) : S(1);
+      const S x = best[0] - side * lengths_[0];
+      const S y = nearest(S(r[1] + (home + side) * offset), 1);
+      if (x * x + y * y < best[0] * best[0] + best[1] * best[1]) {
+        best[0] = x;
+        best[1] = y;
+        boxes = home + side;
+      }
+    }
+    return best;
+  }
+
+  /// \return boxes taken off
+  S wrapAxis(Vector3<S>& x, int axis) const {
+    const S half = lengths_[axis] / S(2);
+    if (x[axis] >= -half && x[axis] < half) {
+      return S(0);
+    }
+    S boxes = detail::nearestInteger(S(x[axis] / lengths_[axis]));
+    S inside = x[axis] - boxes * lengths_[axis];
+    if (inside >= half) {
+      boxes += S(1);
+      inside -= lengths_[axis];
+    } else if (inside < -half) {
+      boxes -= S(1);
+      inside += lengths_[axis];
+    }
+    x[axis] = inside < half ? inside : S(-half);  // a sum that rounds up to the open end
+    return boxes;
+  }
+
+  DomainKind kind_ = DomainKind::Open;
+  Vector3<S> lengths_ = Vector3<S>::Zero();
+  S omega_ = S(0);
+};
+
+}  // namespace gravel

@@ -1,0 +1,137 @@
+#pragma once
+
+/// \file
+/// Uniform grid of cells: the fastest search where radii are alike and bodies fill their bounding box.
+
+#include <gravel/spatial/queries.hpp>
+
+namespace gravel {
+
+/// Points sorted into the cells of their bounding box, row after row.
+template <std::floating_point S>
+class UniformGrid {
+ public:
+  /// Copies the points. Cells are cubes of edge `cell` [m], or larger so that there are at most 8 cells a
+  /// point (which is what bounds memory where points lie far apart).
+  template <class Positions>
+  void build(const Positions& positions, S cell) {
+    const std::size_t n = positions.size();
+    entries_.resize(n);
+    start_.clear();
+    if (n == 0) {
+      return;
+    }
+    Vector3<S> high = positions[0];
+    low_ = high;
+    for (std::size_t i = 1; i < n; ++i) {
+      low_ = low_.cwiseMin(positions[i]);
+      high = high.cwiseMax(positions[i]);
+    }
+    cell_ = cell;
+    const auto cells = [&] {
+      S product(1);
+      for (int axis = 0; axis < 3; ++axis) {
+        product *= std::floor((high[axis] - low_[axis]) / cell_) + S(1);
+      }
+      return product;
+    };
+    while (cells() > S(8) * static_cast<S>(n) + S(64)) {
+      cell_ *= S(1.25);
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      count_[axis] = static_cast<std::size_t>((high[axis] - low_[axis]) / cell_) + 1;
+    }
+    start_.assign(count_[0] * count_[1] * count_[2] + 1, 0);
+    cellOf_.resize(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      const Vector3<S> x = positions[i];
+      cellOf_[i] = (coordinate(x[2], 2) * count_[1] + coordinate(x[1], 1)) * count_[0] + coordinate(x[0], 0);
+      ++start_[cellOf_[i]];
+    }
+    std::partial_sum(start_.begin(), start_.end(), start_.begin());
+    for (std::size_t i = n; i-- > 0;) {  // backwards, so that each start_ ends where its cell begins
+      entries_[--start_[cellOf_[i]]] = {positions[i], static_cast<std::uint32_t>(i)};
+    }
+  }
+
+  std::size_t size() const { return entries_.size(); }
+  S cell() const { return cell_; }
+
+  /// Calls visit(index, squared distance) for each point with distance < radius, in no promised order.
+  /// Safe from several threads at once. O(cells met + hits).
+  template <class Visitor>
+  void forEachWithin(const Vector3<S>& q, S radius, Visitor&& visit) const {
+    if (entries_.empty() || !(radius > S(0))) {
+      return;
+    }
+    std::size_t first[3];
+    std::size_t last[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      first[axis] = coordinate(q[axis] - radius, axis);
+      last[axis] = coordinate(q[axis] + radius, axis);
+    }
+    const S radius_sq = radius * radius;
+    for (std::size_t z = first[2]; z <= last[2]; ++z) {
+      for (std::size_t y = first[1]; y <= last[1]; ++y) {
+        const std::size_t row = (z * count_[1] + y) * count_[0];
+        for (std::size_t e = start_[row + first[0]]; e < start_[row + last[0] + 1]; ++e) {
+          const S distance_sq = (entries_[e].x - q).squaredNorm();
+          if (distance_sq < radius_sq) {
+            visit(static_cast<std::size_t>(entries_[e].index), distance_sq);
+          }
+        }
+      }
+    }
+  }
+
+ private:
+  struct Entry {
+    Vector3<S> x;
+    std::uint32_t index;
+  };
+
+  std::size_t coordinate(const S& x, int axis) const {
+    const S c = (x - low_[axis]) / cell_;
+    const auto last = count_[axis] - 1;
+    if (!(c > S(0))) {
+      return 0;
+    }
+    return c < static_cast<S>(last) ? static_cast<std::size_t>(c) : last;
+  }
+
+  std::vector<Entry> entries_;
+  std::vector<std::size_t> start_;   ///< first entry of each cell, and the end
+  std::vector<std::size_t> cellOf_;  ///< of each point, while building
+  Vector3<S> low_ = Vector3<S>::Zero();
+  S cell_ = S(1);
+  std::size_t count_[3] = {0, 0, 0};
+};
+
+/// Pair search on a uniform grid whose cells hold two of the largest bodies side by side. O(N + pairs) where
+/// radii are alike; with a wide spread of radii use the k-d tree.
+template <std::floating_point S>
+class GridPairs {
+ public:
+  /// Every pair with |r_ij| < r_i + r_j + margin; queries are shared between threads.
+  /// \throws std::invalid_argument for positions or radii that are not finite, or negative radii
+  template <class Positions, class Radii, class Ids>
+  void findPairs(const Positions& positions, const Radii& radii, const Ids& ids, const S& margin,
+                 const Domain<S>& domain, const S& time, std::vector<Pair>& out) {
+    detail::gatherSpheres(positions, radii, ids, domain, time, spheres_);
+    findPairs(spheres_, margin, domain, time, out);
+  }
+
+  void findPairs(const std::vector<detail::Sphere<S>>& spheres, const S& margin, const Domain<S>& domain,
+                 const S& time, std::vector<Pair>& out) {
+    const S reach = S(2) * detail::LargestRadii<S>(spheres).largest + margin;
+    grid_.build(detail::Homes<S>{&spheres}, reach > S(0) ? reach : S(1));
+    detail::findPairsByQueries(grid_, spheres, margin, domain, time, parts_, out);
+  }
+
+ private:
+  UniformGrid<S> grid_;
+  std::vector<detail::Sphere<S>> spheres_;
+  std::vector<std::vector<Pair>> parts_;
+};
+
+}  // namespace gravel

@@ -1,0 +1,116 @@
+#pragma once
+
+/// \file
+/// Pair search by asking an index of points: what the k-d tree and the grid have in common.
+
+#include <gravel/spatial/pair.hpp>
+
+namespace gravel::detail {
+
+/// The places inside the box, as a column.
+template <Real S>
+struct Homes {
+  const std::vector<Sphere<S>>* spheres;
+
+  std::size_t size() const { return spheres->size(); }
+  const Vector3<S>& operator[](std::size_t i) const { return (*spheres)[i].home; }
+};
+
+/// Largest and second largest radius: nothing that body i asks for is farther than r_i + the largest other.
+template <Real S>
+struct LargestRadii {
+  S largest = S(0);
+  S second = S(0);
+  std::size_t owner = 0;
+
+  explicit LargestRadii(const std::vector<Sphere<S>>& spheres) {
+    for (std::size_t i = 0; i < spheres.size(); ++i) {
+      if (spheres[i].radius > largest) {
+        second = largest;
+        largest = spheres[i].radius;
+        owner = i;
+      } else if (spheres[i].radius > second) {
+        second = spheres[i].radius;
+      }
+    }
+  }
+
+  /// How far body i must look, with room for the rounding of a search's own arithmetic on coordinates of
+  /// magnitude `extent`.
+  S reach(const std::vector<Sphere<S>>& spheres, std::size_t i, const S& margin, const S& extent) const {
+    const S r = spheres[i].radius;
+    const S other = i == owner ? second : r;
+    const S eps(std::numeric_limits<S>::epsilon());
+    return (r + other + margin) * (S(1) + S(16) * eps) + S(16) * eps * extent;
+  }
+};
+
+/// Calls f(q) for `home` and for each of its images that a sphere of that reach inside the box can see.
+template <Real S, class F>
+void forEachImage(const Vector3<S>& home, const S& reach, const Domain<S>& domain, const S& time, F&& f) {
+  f(home);
+  if (domain.isOpen()) {
+    return;
+  }
+  const Vector3<S>& L = domain.lengths();
+  const S offset = domain.shearOffset(time);
+  const auto sees = [&](const S& x, int axis) {
+    return x >= -L[axis] / S(2) - reach && x <= L[axis] / S(2) + reach;
+  };
+  for (int bx = -1; bx <= 1; ++bx) {
+    const S x = home[0] + S(bx) * L[0];
+    if (!sees(x, 0)) {
+      continue;
+    }
+    for (int by = -2; by <= 2; ++by) {  // the sheared offset reaches half a box further
+      const S y = home[1] - S(bx) * offset + S(by) * L[1];
+      if (!sees(y, 1)) {
+        continue;
+      }
+      for (int bz = -1; bz <= 1; ++bz) {
+        const S z = home[2] + S(bz) * L[2];
+        if (sees(z, 2) && (bx != 0 || by != 0 || bz != 0)) {
+          f(Vector3<S>(x, y, z));
+        }
+      }
+    }
+  }
+}
+
+/// Pairs from any index of points that answers forEachWithin: each body asks for the smaller ones, so that
+/// few large bodies among many small ones cost nothing extra. Queries are shared between threads.
+template <Real S, class Index>
+void findPairsByQueries(const Index& index, const std::vector<Sphere<S>>& spheres, const S& margin,
+                        const Domain<S>& domain, const S& time, std::vector<std::vector<Pair>>& parts,
+                        std::vector<Pair>& out) {
+  const LargestRadii<S> radii(spheres);
+  S extent(0);
+  for (const Sphere<S>& s : spheres) {
+    extent = std::max<S>(extent, s.home.cwiseAbs().maxCoeff());
+  }
+  if (!domain.isOpen()) {
+    extent += S(2) * domain.lengths().maxCoeff();
+  }
+  constexpr std::size_t chunk = 256;
+  parts.resize((spheres.size() + chunk - 1) / chunk);
+  parallelForChunks(spheres.size(), chunk, [&](std::size_t begin, std::size_t end) {
+    std::vector<Pair>& part = parts[begin / chunk];
+    part.clear();
+    for (std::size_t i = begin; i < end; ++i) {
+      if (!(spheres[i].radius > S(0))) {
+        continue;
+      }
+      const S reach = radii.reach(spheres, i, margin, extent);
+      forEachImage(spheres[i].home, reach, domain, time, [&](const Vector3<S>& q) {
+        index.forEachWithin(q, reach, [&](std::size_t j, S) {
+          if (asksFor(spheres[i], spheres[j])) {
+            appendIfNear(spheres, i, j, margin, domain, time, part);
+          }
+        });
+      });
+    }
+  });
+  joinPairs(parts, spheres, out);
+}
+
+}  // namespace gravel::detail
