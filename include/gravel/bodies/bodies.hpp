@@ -116,6 +116,20 @@ class Bodies {
   /// Ids below `first` are not given any more: a restart says so of bodies that were removed before it.
   void skipIds(BodyId first) { nextId_ = std::max(nextId_, toInteger(first)); }
 
+  /// Takes over all bodies of another container, whatever its layout, with their ids and every field. The own
+  /// storage stays the same object: a user's arrays are written to.
+  template <class Other>
+  void assign(const Bodies<Scalar, Other>& other) {
+    storage_.resize(other.size());
+    index_.clear();
+    for (std::size_t i = 0; i < size(); ++i) {
+      detail::copyBody(storage_, i, other.storage(), i);
+      index_.emplace(toInteger(other[i].id()), i);
+    }
+    skipIds(other.nextId());
+    ++revision_;
+  }
+
   /// Removes a body; the last one takes its index. O(1). \throws std::out_of_range for an unknown id
   void remove(BodyId id) {
     const std::size_t i = indexOf(id);

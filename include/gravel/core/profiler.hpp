@@ -45,22 +45,23 @@ class Profiler {
     const char* reason = nullptr;  ///< why it was skipped the last time; a string literal
   };
 
-  /// Times the rest of the enclosing scope.
+  /// Times the rest of the enclosing scope. Where scopes nest, the outer one's clock stands still meanwhile, so
+  /// that the seconds of all phases add up to the time passed.
   class Scope {
    public:
-    Scope(Profiler& profiler, Phase phase)
-        : entry_(profiler.entries_[static_cast<std::size_t>(phase)]), start_(Clock::now()) {}
+    Scope(Profiler& profiler, Phase phase) : profiler_(profiler), outer_(profiler.running_) {
+      profiler_.change(&profiler_.entries_[static_cast<std::size_t>(phase)]);
+    }
     Scope(const Scope&) = delete;
     Scope& operator=(const Scope&) = delete;
     ~Scope() {
-      entry_.seconds += std::chrono::duration<double>(Clock::now() - start_).count();
-      ++entry_.calls;
+      ++profiler_.running_->calls;
+      profiler_.change(outer_);
     }
 
    private:
-    using Clock = std::chrono::steady_clock;
-    Entry& entry_;
-    Clock::time_point start_;
+    Profiler& profiler_;
+    Entry* outer_;
   };
 
   void skip(Phase phase, const char* reason) {
@@ -92,7 +93,21 @@ class Profiler {
   }
 
  private:
+  using Clock = std::chrono::steady_clock;
+
+  /// Books the time since the last change on the running entry, and lets `next` run.
+  void change(Entry* next) {
+    const Clock::time_point now = Clock::now();
+    if (running_ != nullptr) {
+      running_->seconds += std::chrono::duration<double>(now - since_).count();
+    }
+    running_ = next;
+    since_ = now;
+  }
+
   std::array<Entry, phaseCount> entries_{};
+  Entry* running_ = nullptr;
+  Clock::time_point since_{};
 };
 
 }  // namespace gravel

@@ -1,0 +1,158 @@
+#pragma once
+
+/// \file
+/// An order in which contacts can be solved at once: no two contacts of one colour share a movable body.
+
+#include <gravel/contact/contact.hpp>
+#include <gravel/contact/contact_bodies.hpp>
+#include <gravel/core/check.hpp>
+
+#include <bit>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace gravel {
+
+/// Colours of the contacts, greedily in the order of the list, which is that of the keys: a function of ids
+/// alone. Fixed bodies and boundaries take part in any number of contacts of a colour. Contacts that find no
+/// colour among 62 (of a body with very many partners) go to an overflow group that is solved serially.
+/// Contacts that share no movable body with any other make up a group of their own, the lone ones, which are
+/// exact after one blow. Keeps its workspace; O(contacts), and O(bodies) once for the largest number of them.
+class ContactColoring {
+ public:
+  static constexpr std::size_t maxColours = 62;
+
+  /// Slots: the bodies that take part, numbered from 0 as they first appear; the last one, `staticSlot()`,
+  /// stands for boundaries.
+  struct Row {
+    std::uint32_t contact;  ///< index in the list
+    std::uint32_t slot1;
+    std::uint32_t slot2;
+  };
+
+  /// \throws std::invalid_argument for a contact of a body that is not there, or of a body with itself
+  template <Real S, ContactBodies B>
+  void build(std::span<const Contact<S>> contacts, const B& bodies) {
+    number(contacts, bodies);
+    choose(contacts.size());
+    arrange(contacts.size());
+  }
+
+  /// Rows in the order of solving: lone ones, colour 0, 1, …, overflow.
+  std::span<const Row> rows() const { return rows_; }
+  std::size_t loneCount() const { return start_.front(); }
+  std::size_t colours() const { return start_.size() - 2; }
+  /// Rows [begin, end) of a colour; the colour `colours()` is the overflow.
+  std::size_t begin(std::size_t colour) const { return start_[colour]; }
+  std::size_t end(std::size_t colour) const { return start_[colour + 1]; }
+
+  /// Body of each slot.
+  std::span<const std::uint32_t> bodies() const { return bodyOfSlot_; }
+  std::uint32_t staticSlot() const { return static_cast<std::uint32_t>(bodyOfSlot_.size()); }
+  bool movable(std::uint32_t slot) const { return movable_[slot] != 0; }
+
+ private:
+  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+  static constexpr std::uint8_t overflow = maxColours;
+  static constexpr std::uint8_t lone = maxColours + 1;
+
+  template <Real S, ContactBodies B>
+  void number(std::span<const Contact<S>> contacts, const B& bodies) {
+    if (contacts.size() >= none) {
+      detail::refuse("number of contacts", std::to_string(contacts.size()), "below 2^32 - 1");
+    }
+    for (const Contact<S>& c : contacts) {
+      const bool known = c.first < bodies.size() && (c.second < bodies.size() || c.second == staticPartner);
+      if (!known || c.first == c.second) {
+        detail::refuse("body of a contact", std::to_string(c.first) + ", " + std::to_string(c.second),
+                       "two bodies, below " + std::to_string(bodies.size()) + ", or a boundary");
+      }
+    }
+    slotOfBody_.resize(std::max(slotOfBody_.size(), bodies.size()), none);
+    bodyOfSlot_.clear();
+    movable_.clear();
+    unsorted_.clear();
+    const auto slot = [&](std::uint32_t body) {
+      std::uint32_t& s = slotOfBody_[body];
+      if (s == none) {
+        s = static_cast<std::uint32_t>(bodyOfSlot_.size());
+        bodyOfSlot_.push_back(body);
+        movable_.push_back(detail::isMovable(bodies, body) ? 1 : 0);
+      }
+      return s;
+    };
+    for (std::uint32_t k = 0; k < contacts.size(); ++k) {
+      const std::uint32_t slot1 = slot(contacts[k].first);
+      unsorted_.push_back({k, slot1, contacts[k].second == staticPartner ? none : slot(contacts[k].second)});
+    }
+    for (Row& row : unsorted_) {
+      row.slot2 = row.slot2 == none ? staticSlot() : row.slot2;
+    }
+    movable_.push_back(0);
+    for (const std::uint32_t body : bodyOfSlot_) {
+      slotOfBody_[body] = none;  // ready for the next call
+    }
+  }
+
+  void choose(std::size_t n) {
+    constexpr std::uint64_t all = (std::uint64_t{1} << maxColours) - 1;
+    used_.assign(movable_.size(), 0);
+    degree_.assign(movable_.size(), 0);
+    for (const Row& row : unsorted_) {
+      degree_[row.slot1] += movable_[row.slot1];
+      degree_[row.slot2] += movable_[row.slot2];
+    }
+    colour_.resize(n);
+    for (std::size_t k = 0; k < n; ++k) {
+      const Row& row = unsorted_[k];
+      if (degree_[row.slot1] <= 1 && degree_[row.slot2] <= 1) {
+        colour_[k] = lone;
+        continue;
+      }
+      const std::uint64_t taken = used_[row.slot1] | used_[row.slot2];
+      const std::uint64_t free = ~taken & all;
+      if (free == 0) {
+        colour_[k] = overflow;
+        continue;
+      }
+      const std::uint64_t bit = free & (~free + 1);
+      colour_[k] = static_cast<std::uint8_t>(std::countr_zero(bit));
+      used_[row.slot1] |= movable_[row.slot1] != 0 ? bit : 0;
+      used_[row.slot2] |= movable_[row.slot2] != 0 ? bit : 0;
+    }
+  }
+
+  void arrange(std::size_t n) {
+    std::size_t count[maxColours + 2] = {};
+    for (std::size_t k = 0; k < n; ++k) {
+      ++count[colour_[k]];
+    }
+    std::size_t next[maxColours + 2] = {};
+    std::size_t place = count[lone];
+    start_.assign(1, place);
+    for (std::size_t c = 0; c < maxColours && count[c] > 0; ++c) {  // greedy colours leave no gaps
+      next[c] = place;
+      place += count[c];
+      start_.push_back(place);
+    }
+    next[overflow] = place;
+    start_.push_back(n);
+    rows_.resize(n);
+    for (std::size_t k = 0; k < n; ++k) {
+      rows_[next[colour_[k]]++] = unsorted_[k];
+    }
+  }
+
+  std::vector<Row> rows_;
+  std::vector<Row> unsorted_;
+  std::vector<std::size_t> start_{0, 0};
+  std::vector<std::uint32_t> bodyOfSlot_;
+  std::vector<std::uint32_t> slotOfBody_;
+  std::vector<std::uint32_t> degree_;
+  std::vector<std::uint8_t> movable_;
+  std::vector<std::uint8_t> colour_;
+  std::vector<std::uint64_t> used_;
+};
+
+}  // namespace gravel

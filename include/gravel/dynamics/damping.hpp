@@ -1,0 +1,34 @@
+#pragma once
+
+/// \file
+/// Drag in proportion to velocity, dv/dt = -c v and dw/dt = -c_w w, solved exactly: v(t+h) = v(t) exp(-c h).
+/// No step is too long for it, and two half steps equal one step.
+
+#include <gravel/core/parallel.hpp>
+#include <gravel/bodies/bodies.hpp>
+
+namespace gravel {
+
+/// Damps all bodies over a time h [s] at rates c, c_w [s^-1]. \return the energy taken out [J]
+template <Real Scalar, class Layout>
+Scalar damp(Bodies<Scalar, Layout>& bodies, const Scalar& c, const Scalar& c_w, const Scalar& h) {
+  using std::exp;
+  const Scalar f = exp(-c * h);
+  const Scalar f_w = exp(-c_w * h);
+  const Scalar half = Scalar(1) / Scalar(2);
+  return orderedSum(bodies.size(), 1024, Scalar(0), [&](std::size_t begin, std::size_t end) {
+    Scalar lost(0);
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto body = bodies[i];
+      const Scalar v_sq = body.velocity().squaredNorm();
+      const Scalar w_sq = body.angularVelocity().squaredNorm();
+      body.velocity() *= f;
+      body.angularVelocity() *= f_w;
+      lost += half * (Scalar(body.mass()) * (v_sq - Scalar(body.velocity().squaredNorm())) +
+                      body.inertia() * (w_sq - Scalar(body.angularVelocity().squaredNorm())));
+    }
+    return lost;
+  });
+}
+
+}  // namespace gravel

@@ -1,0 +1,121 @@
+#pragma once
+
+/// \file
+/// All accelerations of a step: mutual gravity, the uniform field, the user's own force.
+
+#include <gravel/core/callback.hpp>
+#include <gravel/core/profiler.hpp>
+#include <gravel/dynamics/integrator.hpp>
+#include <gravel/gravity/gravity_solver.hpp>
+#include <gravel/output/energy_ledger.hpp>
+
+namespace gravel {
+
+/// The user's own force: adds to `bodies.forces()` [N] and `bodies.torques()` [N m] at time t [s]. It is
+/// called from one thread once per force evaluation; mind that it may read positions and velocities and must
+/// change nothing else. Massless tracers have no force to add to.
+template <Real Scalar, class Layout>
+using ForceHook = Callback<void(Bodies<Scalar, Layout>&, Scalar)>;
+
+template <Real Scalar, class Layout>
+class ForceStage {
+ public:
+  Vector3<Scalar> field = Vector3<Scalar>::Zero();  ///< [m s^-2], acts on movable bodies
+  ForceHook<Scalar, Layout> hook;
+  GravitySolver<Scalar> gravity;
+
+  bool hasTorques() const { return static_cast<bool>(hook); }
+
+  /// Sets force, torque, acceleration and angular acceleration of every body at the present positions.
+  void evaluate(Bodies<Scalar, Layout>& bodies, const Scalar& G, const Scalar& softening, const Scalar& time,
+                Profiler& profiler) {
+    const std::size_t n = bodies.size();
+    const char* reason = reasonToSkip(bodies, G);
+    if (reason == nullptr) {
+      const Profiler::Scope scope(profiler, Phase::Gravity);
+      gravity.accelerations(bodies.positions(), bodies.masses(), G, softening, bodies.accelerations());
+    } else {
+      profiler.skip(Phase::Gravity, reason);
+    }
+    parallelFor(n, detail::bodyGrain, [&](std::size_t i) {
+      const auto body = bodies[i];
+      auto&& a = body.acceleration();
+      if (reason != nullptr) {
+        a = Vector3<Scalar>::Zero().eval();
+      }
+      if (body.isFixed()) {
+        body.force() = a * Scalar(body.mass());
+        a = Vector3<Scalar>::Zero().eval();
+      } else {
+        a += field;
+        body.force() = a * Scalar(body.mass());
+      }
+    });
+    if (hook) {
+      addHook(bodies, time);
+    }
+  }
+
+  /// Mutual gravity and the field [J]. O(N^2) by the direct sum.
+  Scalar potentialEnergy(const Bodies<Scalar, Layout>& bodies, const Scalar& G, const Scalar& softening) {
+    Scalar energy(0);
+    if (reasonToSkip(bodies, G) == nullptr) {
+      energy += gravity.potentialEnergy(bodies.positions(), bodies.masses(), G, softening);
+    }
+    if (!(field.squaredNorm() == Scalar(0))) {
+      energy += fieldEnergy(bodies, field);
+    }
+    return energy;
+  }
+
+  /// Power of the user's force at the present velocities [W]; zero without a hook.
+  Scalar hookPower(const Bodies<Scalar, Layout>& bodies) const {
+    Scalar power(0);
+    for (std::size_t i = 0; i < hookForces_.size() && i < bodies.size(); ++i) {
+      const auto body = bodies[i];
+      if (!body.isFixed()) {
+        power += hookForces_[i].dot(Vector3<Scalar>(body.velocity())) +
+                 Vector3<Scalar>(body.torque()).dot(Vector3<Scalar>(body.angularVelocity()));
+      }
+    }
+    return power;
+  }
+
+ private:
+  const char* reasonToSkip(const Bodies<Scalar, Layout>& bodies, const Scalar& G) const {
+    if (G == Scalar(0)) {
+      return "G is 0";
+    }
+    if (bodies.size() < 2) {
+      return "fewer than two bodies";
+    }
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      if (Scalar(bodies[i].mass()) > Scalar(0)) {
+        return nullptr;
+      }
+    }
+    return "no body has mass";
+  }
+
+  void addHook(Bodies<Scalar, Layout>& bodies, const Scalar& time) {
+    const std::size_t n = bodies.size();
+    hookForces_.resize(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      hookForces_[i] = bodies[i].force();
+      bodies[i].torque() = Vector3<Scalar>::Zero().eval();
+    }
+    hook(bodies, time);
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto body = bodies[i];
+      hookForces_[i] = Vector3<Scalar>(body.force()) - hookForces_[i];
+      if (!body.isFixed()) {
+        body.acceleration() += hookForces_[i] * body.inverseMass();
+        body.angularAcceleration() = body.torque() * body.inverseInertia();
+      }
+    }
+  }
+
+  std::vector<Vector3<Scalar>> hookForces_;
+};
+
+}  // namespace gravel

@@ -1,0 +1,208 @@
+#pragma once
+
+/// \file
+/// The facade: a space in which bodies attract each other, collide, rub, spin, stack and settle.
+
+#include <gravel/contact/collision_context.hpp>
+#include <gravel/contact/graph_coloring.hpp>
+#include <gravel/dynamics/adaptive_step.hpp>
+#include <gravel/dynamics/damping.hpp>
+#include <gravel/fwd.hpp>
+#include <gravel/output/conserved.hpp>
+#include <gravel/output/energy_ledger.hpp>
+#include <gravel/space/contact_stage.hpp>
+#include <gravel/space/force_stage.hpp>
+#include <gravel/space/random_bodies.hpp>
+#include <gravel/space/settings.hpp>
+
+#include <string>
+#include <tuple>
+#include <utility>
+
+namespace gravel {
+
+/// Bodies and all that acts on them. Scalar: any `Real`. Layout: SoA, AoS, AoSoA<W> or a user's own storage.
+///
+/// Bodies are reached by index, 0 … n()-1 (removal and reordering change it), or by id, which stays. What is
+/// written through proxies between steps is checked at the next step. A space is driven by one thread; the
+/// work inside is shared between OpenMP's threads, and the result is the same bits for any number of them.
+template <Real Scalar = double, class Layout = SoA>
+class Space : public Settings<Scalar> {
+ public:
+  using Vector = Vector3<Scalar>;
+  using Bodies = gravel::Bodies<Scalar, Layout>;
+  using BodyProxy = typename Bodies::Proxy;
+  using ConstBodyProxy = typename Bodies::ConstProxy;
+  using CollisionContext = gravel::CollisionContext<Scalar, Layout>;
+
+  Space() : Space(SimulationConfig<Scalar>{}) {}
+
+  /// Makes config.bodyCount random bodies (see `randomBodies`). \throws std::invalid_argument listing every
+  /// setting that is out of range
+  explicit Space(const SimulationConfig<Scalar>& config);
+
+  /// Adopts a storage with the bodies in it: another simulator's arrays, without a copy.
+  /// \throws std::invalid_argument as above, or naming the body and field at fault
+  Space(const SimulationConfig<Scalar>& config, typename Bodies::Storage storage);
+
+  // Bodies.
+
+  std::size_t n() const { return bodies_.size(); }
+  /// \throws std::out_of_range unless i < n()
+  BodyProxy body(std::size_t i) { return bodies_[checkedIndex(i)]; }
+  ConstBodyProxy body(std::size_t i) const { return bodies_[checkedIndex(i)]; }
+  /// \throws std::out_of_range if no body has this id
+  BodyProxy body(BodyId id) { return bodies_[bodies_.indexOf(id)]; }
+  ConstBodyProxy body(BodyId id) const { return bodies_[bodies_.indexOf(id)]; }
+  const Bodies& bodies() const { return bodies_; }
+  Bodies& getBodiesForTest() { return bodies_; }
+
+  /// \throws std::invalid_argument naming the field, its value and what is allowed; then nothing is added
+  BodyId addBody(const Body<Scalar>& body);
+  /// The last body takes its index. \throws std::out_of_range if no body has this id
+  void removeBody(BodyId id);
+  /// Sorts the bodies along a Morton curve, so that neighbours in space are neighbours in memory. Changes
+  /// indices, not ids. O(N log N).
+  void reorderBodies();
+
+  // The world around them.
+
+  /// The half-space normal.x >= offset [m] is free. \return its index among the boundaries
+  std::size_t addPlane(const Vector& normal, Scalar offset, MaterialId material = defaultMaterial);
+  /// \throws std::invalid_argument on coefficients out of range
+  MaterialId addMaterial(const Material<Scalar>& material);
+  /// \param g acceleration [m s^-2] of every movable body
+  void setUniformField(const Vector& g);
+  const Vector& uniformField() const { return force_.field; }
+  /// The user's own force; an empty one takes it away again.
+  void setForceHook(ForceHook<Scalar, Layout> hook);
+  /// Open or periodic. \throws std::invalid_argument for a periodic domain with gravity (G > 0), and for a
+  /// shear-periodic one, whose equations of motion no integrator here has; the components take both
+  void setDomain(const Domain<Scalar>& domain);
+  const Domain<Scalar>& domain() const { return contact_.domain; }
+
+  // Time.
+
+  /// One full step: advance, collide, forces, damping, next step size. An empty space only lets time pass.
+  /// \param iteration number of this step; diagnostics are logged when it is a multiple of logFrequency
+  /// \throws std::invalid_argument naming body and field if a value is not finite or out of range; nothing
+  /// has moved then
+  void computeDynamics(std::size_t iteration);
+  /// Steps until `time` [s] exactly; the last step is shortened. \throws std::invalid_argument for a time
+  /// before now or not finite
+  void advanceTo(Scalar time);
+  Scalar time() const { return time_; }
+  std::size_t steps() const { return steps_; }
+  Scalar getTimeStep() const { return dt_; }
+  /// The next step; where steps adapt, also the longest one from now on.
+  void setTimeStep(Scalar dt);
+  Scalar getPreviousTimeStep() const { return previous_dt_; }
+
+  Scalar getG() const { return this->config_.G; }
+  void setG(Scalar g);
+
+  // What can be seen.
+
+  /// (translational, rotational, potential) [J]; the potential counts mutual gravity and the uniform field.
+  std::tuple<Scalar, Scalar, Scalar> calculateSystemEnergy() const;
+  /// Energies now and what left since the start, by process.
+  EnergyLedger<Scalar> energyLedger() const;
+  ConservedQuantities<Scalar> conserved() const { return conservedQuantities(bodies_); }
+  std::tuple<std::vector<Vector>, std::vector<Quaternion<Scalar>>> getAllBodyTransforms() const;
+  /// Positions, orientations, torques, angular accelerations.
+  std::tuple<std::vector<Vector>, std::vector<Quaternion<Scalar>>, std::vector<Vector>, std::vector<Vector>>
+  getDataForDisplay() const;
+  std::size_t contactCount() const { return contact_.contacts().size(); }
+  /// What the contact solver reached in the last step.
+  const ContactReport<Scalar>& contactReport() const { return contact_.report(); }
+  /// Contacts of the last step, in the order of ids.
+  const std::vector<Contact<Scalar>>& contacts() const { return contact_.contacts(); }
+  /// Bodies that touch each body, by index, at the last step.
+  std::vector<std::vector<std::size_t>> collisionGraph() const;
+  /// Seconds by phase, and what was skipped and why, on standard output.
+  void printProfilingReport() const { profiler_.print(stdout); }
+  const Profiler& profiler() const { return profiler_; }
+  /// Where diagnostics go, a line a call; standard output by default.
+  void setLog(Callback<void(const char*)> log) { log_ = std::move(log); }
+
+  /// Writes all that the next steps depend on, but for a force hook and the log.
+  /// \throws std::runtime_error if the file cannot be written
+  void save(const std::string& path) const;
+  /// Takes up a saved run: the next steps give the bits that the saved space would have given. The force hook
+  /// and the log stay those of this space. \throws std::runtime_error, and this space stays as it was
+  void restore(const std::string& path);
+
+  // Parts of the collision handling, as the step uses them.
+
+  /// Empty exactly when the spheres do not overlap.
+  std::optional<CollisionContext> createCollisionContext(BodyProxy& b1, BodyProxy& b2) {
+    return makeCollisionContext<Scalar, Layout>(b1, b2, contact_.domain, time_, this->config_.epsilon);
+  }
+  std::optional<CollisionContext> createCollisionContext(BodyProxy&& b1, BodyProxy&& b2) {
+    return createCollisionContext(b1, b2);
+  }
+  /// Applies the normal impulse. \return the impulse on body 2 [N s], its magnitude, and the part of it that
+  /// is bias: 0, since overlap is removed by moving positions, never by velocity
+  std::tuple<Vector, Scalar, Scalar> applyRestitutionImpulse(CollisionContext& ctx);
+  /// Applies the tangential impulse within Coulomb's cone of the normal impulse jn [N s]. \return the impulse
+  /// on body 2 [N s]
+  Vector applyFrictionImpulse(const CollisionContext& ctx, Scalar jn, const Vector& impulseN);
+  /// Colours the vertices of an undirected graph so that neighbours differ; the result is in `colors()`.
+  /// \throws std::invalid_argument for an index out of range or an edge from a vertex to itself
+  void colorGraph(const std::vector<std::vector<std::size_t>>& graph) { colors_ = gravel::colorGraph(graph); }
+  const std::vector<int>& colors() const { return colors_; }
+
+ private:
+  friend class ::SpaceTest;
+
+  std::size_t checkedIndex(std::size_t i) const;
+  void handleCollision(BodyProxy& b1, BodyProxy& b2);
+  void initializeBodies(std::size_t n, Scalar dens, unsigned int seed);
+  void resolveInterpenetration(const CollisionContext& ctx);
+  Scalar getEffectiveMass(const CollisionContext& ctx, const Vector& direction) const;
+  void logSystemEnergy(std::size_t iteration);
+  void buildCollisionGraph();
+  void resolveCollisions();
+  void applyGravity();
+  void updateAdaptiveTimeStep();
+  void applyDamping();
+
+  void step(const Scalar& h, std::size_t iteration);
+  void refreshForces();
+  void rememberPlaces();
+  bool placesChanged() const;
+  Material<Scalar> pairMaterial(const CollisionContext& ctx) const;
+  Scalar bindingEnergy(std::size_t i) const;
+  Scalar potentialEnergy() const;
+  template <class Change>
+  void changePotential(Change&& change);
+  void checkGravityInDomain(const Scalar& G, const Domain<Scalar>& domain) const;
+  void logLine(const char* line) const;
+
+  Bodies bodies_;
+  mutable ForceStage<Scalar, Layout> force_;  // its workspace serves const queries too
+  ContactStage<Scalar, Layout> contact_;
+  std::vector<int> colors_;
+  Profiler profiler_;
+  Callback<void(const char*)> log_;
+
+  Scalar dt_ = Scalar(0);
+  Scalar previous_dt_ = Scalar(0);
+  Scalar time_ = Scalar(0);
+  Scalar timeRest_ = Scalar(0);  // what time_ lost to rounding (Kahan 1965)
+  std::size_t steps_ = 0;
+  EnergyLedger<Scalar> left_;  // the processes' part of the ledger
+  bool ledgerOpen_ = false;    // bodies added before the first step belong to the start
+  Scalar lastTotalEnergy_ = std::numeric_limits<double>::infinity();
+  Scalar hookPower_ = Scalar(0);
+
+  // Positions and masses at the last force evaluation: forces are renewed if somebody changed them.
+  std::vector<Eigen::Array<Scalar, 4, 1>> places_;
+  bool forcesValid_ = false;
+};
+
+}  // namespace gravel
+
+#include <gravel/space/space_setup.hpp>
+#include <gravel/space/space_state.hpp>
+#include <gravel/space/space_step.hpp>

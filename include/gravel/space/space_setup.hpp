@@ -1,0 +1,165 @@
+#pragma once
+
+/// \file
+/// Members of `Space` that set a scene up or change it.
+
+#include <gravel/space/space.hpp>
+#include <gravel/spatial/morton.hpp>
+
+namespace gravel {
+
+template <Real Scalar, class Layout>
+Space<Scalar, Layout>::Space(const SimulationConfig<Scalar>& config)
+    : Settings<Scalar>(config), dt_(config.timeStep) {
+  initializeBodies(config.bodyCount, config.density, config.seed);
+}
+
+template <Real Scalar, class Layout>
+Space<Scalar, Layout>::Space(const SimulationConfig<Scalar>& config, typename Bodies::Storage storage)
+    : Settings<Scalar>(config), bodies_(std::move(storage)), dt_(config.timeStep) {
+  initializeBodies(config.bodyCount, config.density, config.seed);
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::initializeBodies(std::size_t n, Scalar dens, unsigned int seed) {
+  bodies_.reserve(bodies_.size() + n);
+  for (const Body<Scalar>& body : randomBodies<Scalar>(n, dens, seed)) {
+    bodies_.add(body);
+  }
+}
+
+template <Real Scalar, class Layout>
+std::size_t Space<Scalar, Layout>::checkedIndex(std::size_t i) const {
+  if (i >= n()) {
+    throw std::out_of_range("gravel: body index is " + std::to_string(i) + "; allowed: below n() = " +
+                            std::to_string(n()));
+  }
+  return i;
+}
+
+template <Real Scalar, class Layout>
+BodyId Space<Scalar, Layout>::addBody(const Body<Scalar>& body) {
+  contact_.checkMaterial(body.material);
+  const BodyId id = bodies_.add(body);
+  forcesValid_ = false;
+  if (ledgerOpen_) {
+    left_.exchange -= bindingEnergy(n() - 1);
+  }
+  return id;
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::removeBody(BodyId id) {
+  const std::size_t i = bodies_.indexOf(id);
+  if (ledgerOpen_) {
+    left_.exchange += bindingEnergy(i);
+  }
+  bodies_.remove(id);
+  forcesValid_ = false;
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::reorderBodies() {
+  bodies_.reorder(mortonOrder<Scalar>(bodies_.positions()));
+  rememberPlaces();  // forces moved along with their bodies
+}
+
+template <Real Scalar, class Layout>
+std::size_t Space<Scalar, Layout>::addPlane(const Vector& normal, Scalar offset, MaterialId material) {
+  contact_.checkMaterial(material);
+  contact_.planes.push_back(makePlane(normal, offset, material));
+  return contact_.planes.size() - 1;
+}
+
+template <Real Scalar, class Layout>
+MaterialId Space<Scalar, Layout>::addMaterial(const Material<Scalar>& material) {
+  return contact_.addMaterial(material);
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::setUniformField(const Vector& g) {
+  if (!isFinite(g)) {
+    detail::refuse("uniform field", detail::formatVector(g), "finite");
+  }
+  changePotential([&] { force_.field = g; });
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::setForceHook(ForceHook<Scalar, Layout> hook) {
+  force_.hook = std::move(hook);
+  for (std::size_t i = 0; i < n() && !force_.hook; ++i) {
+    bodies_[i].torque() = Vector::Zero().eval();
+    bodies_[i].angularAcceleration() = Vector::Zero().eval();
+  }
+  hookPower_ = Scalar(0);
+  forcesValid_ = false;
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::checkGravityInDomain(const Scalar& G, const Domain<Scalar>& domain) const {
+  if (domain.kind() == DomainKind::ShearPeriodic) {
+    detail::refuse("domain of a Space", "shear-periodic", "open or periodic");
+  }
+  if (!domain.isOpen() && !(G == Scalar(0))) {
+    detail::refuse("G in a periodic domain", detail::formatReal(G), "0: gravity sums over an open domain only");
+  }
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::setDomain(const Domain<Scalar>& domain) {
+  checkGravityInDomain(getG(), domain);
+  contact_.domain = domain;
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::setG(Scalar g) {
+  SimulationConfig<Scalar> next = this->config_;
+  next.G = g;
+  next.validate();
+  checkGravityInDomain(g, contact_.domain);
+  changePotential([&] { this->config_.G = g; });
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::setTimeStep(Scalar dt) {
+  this->assign(&SimulationConfig<Scalar>::timeStep, dt);
+  dt_ = dt;
+}
+
+/// A change of the potential's law moves energy in or out; the ledger counts it from the first step on.
+template <Real Scalar, class Layout>
+template <class Change>
+void Space<Scalar, Layout>::changePotential(Change&& change) {
+  const Scalar before = ledgerOpen_ ? potentialEnergy() : Scalar(0);
+  change();
+  if (ledgerOpen_) {
+    left_.exchange += before - potentialEnergy();
+  }
+  forcesValid_ = false;
+}
+
+/// Kinetic energy of body i and its share of the potential: what leaves with it. O(N).
+template <Real Scalar, class Layout>
+Scalar Space<Scalar, Layout>::bindingEnergy(std::size_t i) const {
+  const auto one = bodies_[i];
+  const Scalar m = one.mass();
+  const Vector x = one.position();
+  Scalar energy = (m * Scalar(one.velocity().squaredNorm()) +
+                   one.inertia() * Scalar(one.angularVelocity().squaredNorm())) /
+                  Scalar(2);
+  if (!one.isFixed()) {
+    energy -= m * force_.field.dot(x);
+  }
+  if (!(getG() == Scalar(0)) && m > Scalar(0)) {
+    for (std::size_t j = 0; j < n(); ++j) {
+      if (j != i) {
+        const Vector r_ij = Vector(bodies_[j].position()) - x;
+        energy += getG() * m * Scalar(bodies_[j].mass()) *
+                  pairPotential(Scalar(r_ij.squaredNorm()), this->config_.softening);
+      }
+    }
+  }
+  return energy;
+}
+
+}  // namespace gravel

@@ -1,0 +1,199 @@
+#pragma once
+
+/// \file
+/// Members of `Space` that look at its state, report it, save it and take it up again.
+
+#include <gravel/output/snapshot.hpp>
+#include <gravel/space/space.hpp>
+
+namespace gravel {
+
+template <Real Scalar, class Layout>
+Scalar Space<Scalar, Layout>::potentialEnergy() const {
+  return force_.potentialEnergy(bodies_, getG(), this->config_.softening);
+}
+
+template <Real Scalar, class Layout>
+std::tuple<Scalar, Scalar, Scalar> Space<Scalar, Layout>::calculateSystemEnergy() const {
+  EnergyLedger<Scalar> now;
+  addKineticEnergy(bodies_, now);
+  return {now.kinetic, now.rotational, potentialEnergy()};
+}
+
+template <Real Scalar, class Layout>
+EnergyLedger<Scalar> Space<Scalar, Layout>::energyLedger() const {
+  EnergyLedger<Scalar> ledger = left_;
+  addKineticEnergy(bodies_, ledger);
+  ledger.potential = potentialEnergy();
+  return ledger;
+}
+
+template <Real Scalar, class Layout>
+std::tuple<std::vector<Vector3<Scalar>>, std::vector<Quaternion<Scalar>>>
+Space<Scalar, Layout>::getAllBodyTransforms() const {
+  std::vector<Vector> positions(n());
+  std::vector<Quaternion<Scalar>> orientations(n());
+  for (std::size_t i = 0; i < n(); ++i) {
+    positions[i] = bodies_[i].position();
+    orientations[i] = Quaternion<Scalar>(bodies_[i].orientation());
+  }
+  return {std::move(positions), std::move(orientations)};
+}
+
+template <Real Scalar, class Layout>
+std::tuple<std::vector<Vector3<Scalar>>, std::vector<Quaternion<Scalar>>, std::vector<Vector3<Scalar>>,
+           std::vector<Vector3<Scalar>>>
+Space<Scalar, Layout>::getDataForDisplay() const {
+  auto transforms = getAllBodyTransforms();
+  std::vector<Vector> torques(n());
+  std::vector<Vector> angularAccelerations(n());
+  for (std::size_t i = 0; i < n(); ++i) {
+    torques[i] = bodies_[i].torque();
+    angularAccelerations[i] = bodies_[i].angularAcceleration();
+  }
+  return {std::move(std::get<0>(transforms)), std::move(std::get<1>(transforms)), std::move(torques),
+          std::move(angularAccelerations)};
+}
+
+template <Real Scalar, class Layout>
+std::vector<std::vector<std::size_t>> Space<Scalar, Layout>::collisionGraph() const {
+  std::vector<std::vector<std::size_t>> graph(n());
+  for (const Contact<Scalar>& contact : contacts()) {
+    if (contact.second != staticPartner && contact.first < n() && contact.second < n()) {
+      graph[contact.first].push_back(contact.second);
+      graph[contact.second].push_back(contact.first);
+    }
+  }
+  return graph;
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::logLine(const char* line) const {
+  if (log_) {
+    log_(line);
+  } else {
+    std::puts(line);
+  }
+}
+
+/// Logs energies every logFrequency steps. Warns when the total of the ledger, which only the error of the time
+/// integration changes, has moved by more than a tenth of the energy in play since the last line, or is not
+/// finite.
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::logSystemEnergy(std::size_t iteration) {
+  if (!this->config_.diagnosticsEnabled) {
+    profiler_.skip(Phase::Diagnostics, "diagnosticsEnabled is off");
+    return;
+  }
+  if (iteration % this->config_.logFrequency != 0) {
+    profiler_.skip(Phase::Diagnostics, "between two lines of the log");
+    return;
+  }
+  using std::abs;
+  const Profiler::Scope scope(profiler_, Phase::Diagnostics);
+  const EnergyLedger<Scalar> e = energyLedger();
+  const Scalar total = e.total();
+  const auto text = [](const Scalar& x) { return detail::formatReal(x); };
+  logLine(("gravel: step " + std::to_string(iteration) + " t " + text(time_) + " s dt " + text(previous_dt_) +
+           " s kinetic " + text(e.kinetic) + " J rotational " + text(e.rotational) + " J potential " +
+           text(e.potential) + " J dissipated " + text(e.dissipated()) + " J total " + text(total) + " J")
+              .c_str());
+  const Scalar inPlay = e.kinetic + e.rotational + abs(e.potential);
+  if (!isFinite(total)) {
+    logLine("gravel: warning: the energy is not finite; the state cannot be trusted, take a shorter step");
+  } else if (isFinite(lastTotalEnergy_) && abs(total - lastTotalEnergy_) > inPlay / Scalar(10)) {
+    logLine(("gravel: warning: unstable: the energy ledger moved by " + text(total - lastTotalEnergy_) +
+             " J since the last line, of " + text(inPlay) + " J in play; take a shorter step")
+                .c_str());
+  }
+  lastTotalEnergy_ = total;
+}
+
+namespace detail {
+
+/// The space's own numbers in a snapshot, in one order for writing and reading.
+template <Real Scalar>
+struct SpaceNumbers {
+  Scalar dt, previous_dt, time, timeRest, lastTotalEnergy, hookPower;
+  EnergyLedger<Scalar> left;
+  Vector3<Scalar> field;
+  std::uint64_t steps, nextId;
+  std::uint64_t ledgerOpen;
+
+  template <class Visitor>
+  void forEach(Visitor&& visit) {
+    visit("dt", dt);
+    visit("previous_dt", previous_dt);
+    visit("time", time);
+    visit("timeRest", timeRest);
+    visit("lastTotalEnergy", lastTotalEnergy);
+    visit("hookPower", hookPower);
+    visit("left", left);
+    visit("field.x", field[0]);
+    visit("field.y", field[1]);
+    visit("field.z", field[2]);
+    visit("steps", steps);
+    visit("nextId", nextId);
+    visit("ledgerOpen", ledgerOpen);
+  }
+};
+
+}  // namespace detail
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::save(const std::string& path) const {
+  SnapshotWriter out;
+  forEachSetting(this->config_, [&](const Setting<Scalar>& setting, const auto& value) {
+    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, bool>) {
+      out.value(std::string("setting ") + setting.name, static_cast<std::uint8_t>(value));
+    } else {
+      out.value(std::string("setting ") + setting.name, value);
+    }
+  });
+  detail::SpaceNumbers<Scalar> numbers{dt_,       previous_dt_,
+                                       time_,     timeRest_,
+                                       lastTotalEnergy_, hookPower_,
+                                       left_,     force_.field,
+                                       steps_,    toInteger(bodies_.nextId()),
+                                       ledgerOpen_ ? std::uint64_t{1} : std::uint64_t{0}};
+  numbers.forEach([&](const char* name, const auto& value) { out.value(name, value); });
+  contact_.save(out);
+  saveBodies(bodies_, out);
+  out.write(path);
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::restore(const std::string& path) {
+  SnapshotReader in(path);
+  SimulationConfig<Scalar> config;
+  forEachSetting(config, [&]<class T>(const Setting<Scalar>& setting, T& value) {
+    using Stored = std::conditional_t<std::is_same_v<T, bool>, std::uint8_t, T>;
+    value = static_cast<T>(in.value<Stored>(std::string("setting ") + setting.name));
+  });
+  config.validate();
+  detail::SpaceNumbers<Scalar> numbers{};
+  numbers.forEach([&]<class T>(const char* name, T& value) { value = in.value<T>(name); });
+  ContactStage<Scalar, Layout> contact;
+  contact.load(in);
+  gravel::Bodies<Scalar, SoA> bodies = loadBodies<Scalar>(in);
+  bodies.skipIds(BodyId{numbers.nextId});
+
+  // Nothing throws from here on but for want of memory.
+  bodies_.assign(bodies);
+  this->config_ = config;
+  contact_ = std::move(contact);
+  force_.field = numbers.field;
+  colors_.clear();
+  dt_ = numbers.dt;
+  previous_dt_ = numbers.previous_dt;
+  time_ = numbers.time;
+  timeRest_ = numbers.timeRest;
+  lastTotalEnergy_ = numbers.lastTotalEnergy;
+  hookPower_ = numbers.hookPower;
+  left_ = numbers.left;
+  steps_ = static_cast<std::size_t>(numbers.steps);
+  ledgerOpen_ = numbers.ledgerOpen != 0;
+  rememberPlaces();
+}
+
+}  // namespace gravel

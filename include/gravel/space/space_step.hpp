@@ -1,0 +1,208 @@
+#pragma once
+
+/// \file
+/// Members of `Space` that make a step.
+///
+/// Order of a step of length h, with a(x) the acceleration of the last evaluation:
+///   1. kick and drift by the integrator's table; when positions are final
+///   2. contacts are found there, and overlaps shrink by moving bodies (no velocity changes);
+///   3. forces at those positions, last kick;
+///   4. contacts are solved together on the velocities of the step's end, so that a body at rest has velocity
+///      zero, and each contact's impulse is its force times h;
+///   5. damping; 6. time passes, next step size; 7. diagnostics.
+
+#include <gravel/space/space.hpp>
+
+namespace gravel {
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::computeDynamics(std::size_t iteration) {
+  step(dt_, iteration);
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::advanceTo(Scalar time) {
+  if (!isFinite(time) || time < time_) {
+    detail::refuse("time to advance to", detail::formatReal(time),
+                   "finite, at least the present time " + detail::formatReal(time_));
+  }
+  while (time_ < time) {
+    const Scalar rest = time - time_;
+    // A rest of a millionth of a step is joined to the step: it is rounding in the sum of steps.
+    if (rest <= dt_ * Scalar(1.000001)) {
+      const Scalar next = dt_;
+      step(rest, steps_);
+      if (!this->config_.adaptiveTimeStep) {
+        dt_ = next;
+      }
+      time_ = time;
+      timeRest_ = Scalar(0);
+    } else {
+      step(dt_, steps_);
+    }
+  }
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::step(const Scalar& h, std::size_t iteration) {
+  if (!bodies_.empty()) {
+    bodies_.validateAll();
+    contact_.checkMaterials(bodies_);
+    ledgerOpen_ = true;
+    refreshForces();
+    const auto forces = [&](const Scalar& passed) {
+      force_.evaluate(bodies_, getG(), this->config_.softening, Scalar(time_ + passed), profiler_);
+    };
+    const auto arrival = [&] {
+      contact_.wrap(bodies_, Scalar(time_ + h));
+      buildCollisionGraph();
+      contact_.separate(bodies_, this->config_, Scalar(time_ + h), profiler_);
+    };
+    {
+      const Profiler::Scope scope(profiler_, Phase::Integration);
+      integrate(this->config_.integrator, bodies_, h, force_.hasTorques(), forces, arrival);
+    }
+    rememberPlaces();
+    left_.correction += contact_.separationWork(bodies_, force_);
+    if (force_.hook) {
+      const Scalar power = force_.hookPower(bodies_);
+      left_.work -= (hookPower_ + power) * h / Scalar(2);
+    }
+    previous_dt_ = h;
+    resolveCollisions();
+    applyDamping();
+    if (force_.hook) {
+      hookPower_ = force_.hookPower(bodies_);
+    }
+  } else {
+    profiler_.skip(Phase::Integration, "no bodies");
+  }
+  previous_dt_ = h;
+  const Scalar sum = time_ + (h + timeRest_);
+  timeRest_ = (h + timeRest_) - (sum - time_);
+  time_ = sum;
+  ++steps_;
+  updateAdaptiveTimeStep();
+  logSystemEnergy(iteration);
+}
+
+/// Forces of the present places, if a body, its place or its mass was changed since they were evaluated.
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::refreshForces() {
+  if (!forcesValid_ || placesChanged()) {
+    applyGravity();
+    rememberPlaces();
+    hookPower_ = force_.hookPower(bodies_);
+  }
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::rememberPlaces() {
+  places_.resize(n());
+  parallelFor(n(), detail::bodyGrain, [&](std::size_t i) {
+    places_[i].template head<3>() = bodies_[i].position().array();
+    places_[i][3] = bodies_[i].mass();
+  });
+  forcesValid_ = true;
+}
+
+template <Real Scalar, class Layout>
+bool Space<Scalar, Layout>::placesChanged() const {
+  if (places_.size() != n()) {
+    return true;
+  }
+  for (std::size_t i = 0; i < n(); ++i) {
+    const auto body = bodies_[i];
+    if (!(places_[i].template head<3>() == body.position().array()).all() || !(places_[i][3] == body.mass())) {
+      return true;
+    }
+  }
+  return false;
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::applyGravity() {
+  force_.evaluate(bodies_, getG(), this->config_.softening, time_, profiler_);
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::buildCollisionGraph() {
+  contact_.detect(bodies_, this->config_, Scalar(time_), profiler_);
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::resolveCollisions() {
+  contact_.solve(bodies_, this->config_, previous_dt_, profiler_);
+  left_.restitution += contact_.report().restitutionLoss;
+  left_.friction += contact_.report().frictionLoss;
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::applyDamping() {
+  const SimulationConfig<Scalar>& c = this->config_;
+  if (c.linearDamping == Scalar(0) && c.angularDamping == Scalar(0)) {
+    profiler_.skip(Phase::Damping, "both rates are 0");
+    return;
+  }
+  const Profiler::Scope scope(profiler_, Phase::Damping);
+  left_.damping += damp(bodies_, c.linearDamping, c.angularDamping, previous_dt_);
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::updateAdaptiveTimeStep() {
+  const SimulationConfig<Scalar>& c = this->config_;
+  if (!c.adaptiveTimeStep) {
+    profiler_.skip(Phase::TimeStep, "adaptiveTimeStep is off");
+    return;
+  }
+  const Profiler::Scope scope(profiler_, Phase::TimeStep);
+  const StepLimits<Scalar> limits{c.timeStepFactor, c.minTimeStep, c.timeStep};
+  const auto separation = [&](const auto& x1, const auto& x2) {
+    return contact_.domain.minimumImage(Vector(x2) - Vector(x1), time_);
+  };
+  dt_ = std::min(stepFromMotion(bodies_, c.softening, limits),
+                 stepFromApproach(bodies_, contact_.candidates(), separation, limits));
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::handleCollision(BodyProxy& b1, BodyProxy& b2) {
+  if (auto ctx = createCollisionContext(b1, b2)) {
+    const std::tuple<Vector, Scalar, Scalar> blow = applyRestitutionImpulse(*ctx);
+    applyFrictionImpulse(*ctx, std::get<1>(blow), std::get<0>(blow));
+    resolveInterpenetration(*ctx);
+  }
+}
+
+template <Real Scalar, class Layout>
+Material<Scalar> Space<Scalar, Layout>::pairMaterial(const CollisionContext& ctx) const {
+  return contact_.pairMaterial(ctx.body1.material(), ctx.body2.material(), this->config_);
+}
+
+template <Real Scalar, class Layout>
+std::tuple<Vector3<Scalar>, Scalar, Scalar> Space<Scalar, Layout>::applyRestitutionImpulse(
+    CollisionContext& ctx) {
+  const NormalImpulse<Scalar> blow =
+      applyNormalImpulse<Scalar, Layout>(ctx, pairMaterial(ctx).restitution,
+                                         std::max(this->config_.restitutionThreshold, this->config_.epsilon));
+  return {blow.impulse, blow.magnitude, blow.bias};
+}
+
+template <Real Scalar, class Layout>
+Vector3<Scalar> Space<Scalar, Layout>::applyFrictionImpulse(const CollisionContext& ctx, Scalar jn,
+                                                            const Vector& /*impulseN*/) {
+  const Material<Scalar> m = pairMaterial(ctx);
+  return gravel::applyFrictionImpulse<Scalar, Layout>(ctx, jn, m.staticFriction, m.kineticFriction,
+                                                      m.tangentialRestitution);
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::resolveInterpenetration(const CollisionContext& ctx) {
+  gravel::separate<Scalar, Layout>(ctx, this->config_.positionalCorrectionFactor);
+}
+
+template <Real Scalar, class Layout>
+Scalar Space<Scalar, Layout>::getEffectiveMass(const CollisionContext& ctx, const Vector& direction) const {
+  return effectiveMass<Scalar, Layout>(ctx, direction);
+}
+
+}  // namespace gravel
