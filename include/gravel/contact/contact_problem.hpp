@@ -1,0 +1,293 @@
+#pragma once
+
+/// \file
+/// All contacts of a step in the form that solvers work on: compact copies of the bodies (eight Scalars each)
+/// and one row a contact. Layouts and user's arrays end here.
+
+#include <gravel/contact/contact_coloring.hpp>
+#include <gravel/core/parallel.hpp>
+
+#include <vector>
+
+namespace gravel {
+
+/// How contacts are solved.
+template <Real Scalar>
+struct ContactSettings {
+  /// [m s^-1] >= 0: restitution acts on an approach faster than this plus what a resting contact picks up in
+  /// a step, 2 |a_rel.n| dt; a slower one stops. The same holds for tangential restitution.
+  Scalar restitutionThreshold = Scalar(0);
+  /// [1] > 0: sweeps end when the largest change of a velocity in a sweep is at most this times the largest
+  /// speed of approach among the contacts. The error of the impulses is this times the number of sweeps that
+  /// a disturbance takes through the pile.
+  Scalar tolerance = Scalar(1e-6);
+  int maxIterations = 100;  ///< >= 1: sweeps at most
+  bool warmStart = true;    ///< begin from the impulses of the last step
+};
+
+/// What a solve did.
+template <Real Scalar>
+struct ContactReport {
+  std::size_t contacts = 0;
+  std::size_t colours = 0;
+  int iterations = 0;           ///< sweeps
+  Scalar residual = Scalar(0);  ///< [1] largest change of a velocity in the last sweep / largest approach
+  Scalar restitutionLoss = Scalar(0);  ///< [J] energy taken by normal impulses
+  Scalar frictionLoss = Scalar(0);     ///< [J] energy taken by tangential impulses
+  Scalar driftWork = Scalar(0);  ///< [J] energy put in by moving boundaries and by the shear of the domain
+};
+
+/// Impulse of a contact on its second body [N s]; on the first its opposite.
+template <Real Scalar>
+struct ContactImpulse {
+  Scalar normal = Scalar(0);  ///< >= 0, along Contact::normal
+  Vector3<Scalar> tangential = Vector3<Scalar>::Zero();
+};
+
+namespace detail {
+
+template <Real S>
+struct SolverBody {
+  Vector3<S> v;
+  S inverseMass;
+  Vector3<S> s;  ///< r w: speed of the surface
+  S spin;        ///< 1/(k m)
+};
+
+template <Real S>
+struct SolverRow {
+  Vector3<S> n;
+  S c1;  ///< arm / radius
+  S c2;
+  S normalMass;           ///< 1/(1/m1 + 1/m2)
+  S tangentialMass;       ///< 1/(1/m1 (1 + c1^2/k1) + 1/m2 (1 + c2^2/k2))
+  S target;               ///< v_n after the blow is at least this
+  Vector3<S> slipTarget;  ///< slip after a blow that sticks
+  S staticFriction;
+  S kineticFriction;
+  S jn;
+  Vector3<S> jt;
+  std::uint32_t slot1;
+  std::uint32_t slot2;
+  std::uint32_t contact;
+  std::uint32_t slides;  ///< how often it went from sticking to sliding
+};
+
+template <Real S>
+S normalVelocity(const SolverRow<S>& row, const SolverBody<S>& b1, const SolverBody<S>& b2) {
+  return row.n.dot(Vector3<S>(b2.v - b1.v));
+}
+
+template <Real S>
+Vector3<S> slipVelocity(const SolverRow<S>& row, const SolverBody<S>& b1, const SolverBody<S>& b2) {
+  const Vector3<S> v_rel = b2.v - b1.v;
+  return v_rel - row.n.dot(v_rel) * row.n - Vector3<S>(row.c1 * b1.s + row.c2 * b2.s).cross(row.n);
+}
+
+/// v += 2^exponent, exactly; a scalar that is not built in stays as it is.
+template <Real S>
+S scaled(const S& x, int exponent) {
+  if constexpr (std::is_floating_point_v<S>) {
+    return exponent == 0 ? x : std::ldexp(x, exponent);
+  } else {
+    return x;
+  }
+}
+
+template <Real S>
+Vector3<S> scaled(const Vector3<S>& v, int exponent) {
+  return exponent == 0
+             ? v
+             : Vector3<S>(scaled<S>(v[0], exponent), scaled<S>(v[1], exponent), scaled<S>(v[2], exponent));
+}
+
+/// Power of two that brings numbers between low and high near 1; 0 while they are harmless anyway.
+template <Real S>
+int scaleExponent(const S& low, const S& high) {
+  if constexpr (std::is_floating_point_v<S>) {
+    constexpr int harmless = std::numeric_limits<S>::max_exponent / 5;
+    int lowExponent = 0;
+    int highExponent = 0;
+    (void)std::frexp(low, &lowExponent);
+    (void)std::frexp(high, &highExponent);
+    if (high > S(0) && (highExponent > harmless || lowExponent < -harmless)) {
+      return -(lowExponent + highExponent) / 2;
+    }
+  }
+  return 0;
+}
+
+}  // namespace detail
+
+/// The problem of one step. Speeds and masses far from 1 are scaled by powers of two, which is exact, so that
+/// dust at 1e-310 m/s neither vanishes nor crawls through subnormal arithmetic.
+template <Real S>
+class ContactProblem {
+ public:
+  using Body = detail::SolverBody<S>;
+  using Row = detail::SolverRow<S>;
+
+  std::vector<Body> bodies;   ///< by slot; the last one is the boundary, at rest
+  std::vector<Body> initial;  ///< the same before any impulse
+  std::vector<Row> rows;      ///< in the colouring's order
+  bool friction = false;      ///< any contact with friction
+  bool active = false;        ///< any contact that approaches faster than it may
+  S largestApproach = S(0);   ///< largest change of a normal velocity that a contact asks for
+
+  /// \param dt [s] step that these contacts stand for, >= 0
+  template <ContactBodies B>
+  void gather(std::span<const Contact<S>> contacts, const B& source, const ContactColoring& colouring,
+              const S& dt, const ContactSettings<S>& settings) {
+    friction = std::any_of(contacts.begin(), contacts.end(),
+                           [](const Contact<S>& c) { return c.material.staticFriction > S(0); });
+    gatherBodies(source, colouring);
+    rows.resize(contacts.size());
+    std::vector<S> approach((rows.size() + chunk - 1) / chunk, S(0));
+    parallelForChunks(rows.size(), chunk, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t k = begin; k < end; ++k) {
+        const ContactColoring::Row& place = colouring.rows()[k];
+        fill(rows[k], contacts[place.contact], place, source, dt, settings);
+        const S excess =
+            rows[k].target - detail::normalVelocity(rows[k], bodies[place.slot1], bodies[place.slot2]);
+        approach[begin / chunk] = std::max<S>(approach[begin / chunk], excess);
+      }
+    });
+    largestApproach = approach.empty() ? S(0) : *std::max_element(approach.begin(), approach.end());
+    active = largestApproach > S(0);
+  }
+
+  /// Writes the velocities of movable bodies back, spins only where they changed.
+  template <ContactBodies B>
+  void scatter(B& target, const ContactColoring& colouring) const {
+    auto&& velocities = target.velocities();
+    auto&& spins = target.angularVelocities();
+    auto&& radii = target.radii();
+    parallelFor(colouring.bodies().size(), chunk, [&](std::size_t slot) {
+      const std::uint32_t i = colouring.bodies()[slot];
+      if (bodies[slot].v != initial[slot].v) {
+        velocities[i] = detail::scaled<S>(bodies[slot].v, -speedExponent_);
+      }
+      if (friction && bodies[slot].s != initial[slot].s) {
+        spins[i] = Vector3<S>(detail::scaled<S>(bodies[slot].s, -speedExponent_) / radii[i]);
+      }
+    });
+  }
+
+  /// Impulses and energies in SI units from those of the scaled problem, and back.
+  S impulseOut(const S& j) const { return detail::scaled<S>(j, -speedExponent_ - massExponent_); }
+  Vector3<S> impulseOut(const Vector3<S>& j) const {
+    return detail::scaled<S>(j, -speedExponent_ - massExponent_);
+  }
+  S impulseIn(const S& j) const { return detail::scaled<S>(j, speedExponent_ + massExponent_); }
+  Vector3<S> impulseIn(const Vector3<S>& j) const {
+    return detail::scaled<S>(j, speedExponent_ + massExponent_);
+  }
+  S energyOut(const S& e) const { return detail::scaled<S>(e, -2 * speedExponent_ - massExponent_); }
+  S speedIn(const S& v) const { return detail::scaled<S>(v, speedExponent_); }
+  Vector3<S> speedIn(const Vector3<S>& v) const { return detail::scaled<S>(v, speedExponent_); }
+
+ private:
+  static constexpr std::size_t chunk = 2048;
+
+  template <class B>
+  void gatherBodies(const B& source, const ContactColoring& colouring) {
+    const std::size_t n = colouring.bodies().size();
+    bodies.resize(n + 1);
+    S fastest(0);
+    S lightest(0);
+    S heaviest(0);
+    for (std::size_t slot = 0; slot < n; ++slot) {
+      const std::uint32_t i = colouring.bodies()[slot];
+      Body& b = bodies[slot];
+      const bool movable = colouring.movable(static_cast<std::uint32_t>(slot));
+      const S r = source.radii()[i];
+      const S k = source.inertiaFactors()[i];
+      b.v = source.velocities()[i];
+      b.s = Vector3<S>::Zero();
+      if (friction) {
+        b.s = r * Vector3<S>(source.angularVelocities()[i]);
+      }
+      b.inverseMass = movable ? S(source.masses()[i]) : S(0);  // the mass, until its scale is known
+      b.spin = movable && r > S(0) && k > S(0) ? S(1) / k : S(0);
+      fastest = std::max<S>(fastest, std::max<S>(b.v.cwiseAbs().maxCoeff(), b.s.cwiseAbs().maxCoeff()));
+      if (movable) {
+        heaviest = std::max<S>(heaviest, b.inverseMass);
+        lightest = lightest > S(0) ? std::min<S>(lightest, b.inverseMass) : b.inverseMass;
+      }
+    }
+    bodies[n] = Body{Vector3<S>::Zero(), S(0), Vector3<S>::Zero(), S(0)};
+    speedExponent_ = detail::scaleExponent<S>(fastest, fastest);
+    massExponent_ = detail::scaleExponent<S>(lightest, heaviest);
+    for (std::size_t slot = 0; slot < n; ++slot) {
+      Body& b = bodies[slot];
+      if (speedExponent_ != 0) {
+        b.v = detail::scaled<S>(b.v, speedExponent_);
+        b.s = detail::scaled<S>(b.s, speedExponent_);
+      }
+      if (b.inverseMass > S(0)) {
+        b.inverseMass = S(1) / detail::scaled<S>(b.inverseMass, massExponent_);
+        b.spin *= b.inverseMass;
+      }
+    }
+    initial = bodies;
+  }
+
+  template <class B>
+  void fill(Row& row, const Contact<S>& c, const ContactColoring::Row& place, const B& source, const S& dt,
+            const ContactSettings<S>& settings) const {
+    const Body& b1 = bodies[place.slot1];
+    const Body& b2 = bodies[place.slot2];
+    row.n = c.normal;
+    row.slot1 = place.slot1;
+    row.slot2 = place.slot2;
+    row.contact = place.contact;
+    row.slides = 0;
+    row.jn = S(0);
+    row.jt = Vector3<S>::Zero();
+    row.c1 = ratio(c.arm1, source.radii()[c.first]);
+    row.c2 = c.second == staticPartner ? S(0) : ratio(c.arm2, source.radii()[c.second]);
+    row.normalMass = inverse(b1.inverseMass + b2.inverseMass);
+    row.tangentialMass =
+        inverse(b1.inverseMass + b2.inverseMass + row.c1 * row.c1 * b1.spin + row.c2 * row.c2 * b2.spin);
+    row.staticFriction = c.material.staticFriction;
+    row.kineticFriction = c.material.kineticFriction;
+
+    const Vector3<S> drift = speedIn(c.drift);
+    const S drift_n = row.n.dot(drift);
+    const S v_n = detail::normalVelocity(row, b1, b2) + drift_n;
+    const S threshold = speedIn(settings.restitutionThreshold + S(2) * relativeAcceleration(c, source) * dt);
+    const S allowed = c.gap > S(0) ? (dt > S(0) ? speedIn(c.gap / dt) : std::numeric_limits<S>::max()) : S(0);
+    const bool impact = -v_n > threshold && -v_n > allowed;
+    // A contact that separates may come to approach as fast, pushed by others, and bounces in the next step:
+    // J_n (v_n^- + v_n^+) <= 0 for every contact, so no choice of restitutions makes energy (see
+    // contact_energy.hpp).
+    row.target = impact ? -restitutionAt(c.material, S(-v_n)) * v_n : -std::max<S>(allowed, v_n);
+    row.target -= drift_n;
+    row.slipTarget = drift_n * row.n - drift;
+    if (friction && impact && c.material.tangentialRestitution > S(0)) {
+      const Vector3<S> slip = detail::slipVelocity(row, b1, b2) - row.slipTarget;
+      row.slipTarget -= c.material.tangentialRestitution * slip;
+    }
+  }
+
+  static S inverse(const S& x) { return x > S(0) ? S(1) / x : S(0); }
+  static S ratio(const S& arm, const S& radius) { return radius > S(0) ? arm / radius : S(0); }
+
+  /// |a_rel.n| of the movable ends.
+  template <class B>
+  static S relativeAcceleration(const Contact<S>& c, const B& source) {
+    S a(0);
+    if (detail::isMovable(source, c.first)) {
+      a -= c.normal.dot(Vector3<S>(source.accelerations()[c.first]));
+    }
+    if (c.second != staticPartner && detail::isMovable(source, c.second)) {
+      a += c.normal.dot(Vector3<S>(source.accelerations()[c.second]));
+    }
+    return a < S(0) ? S(-a) : a;
+  }
+
+  int speedExponent_ = 0;
+  int massExponent_ = 0;
+};
+
+}  // namespace gravel

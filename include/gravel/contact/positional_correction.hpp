@@ -1,0 +1,189 @@
+#pragma once
+
+/// \file
+/// Removes overlap by moving positions, never by velocity: no energy of motion is made.
+
+#include <gravel/contact/contact_coloring.hpp>
+#include <gravel/core/parallel.hpp>
+
+namespace gravel {
+
+template <Real Scalar>
+struct CorrectionSettings {
+  Scalar factor = Scalar(0.8);  ///< [1], 0 … 1: part of each overlap to remove
+  Scalar slop = Scalar(0);      ///< [m] >= 0: overlap that stays
+  /// [1] > 0: largest part of the smaller of the two radii by which one contact is opened in a call, so that
+  /// deep overlaps come apart over several steps.
+  Scalar cap = Scalar(0.5);
+  Scalar tolerance =
+      Scalar(1e-3);        ///< [1] > 0: sweeps end when the largest move is this times the largest overlap
+  int maxIterations = 20;  ///< >= 1
+};
+
+/// A body that was moved, and by how much [m].
+template <Real Scalar>
+struct Displacement {
+  std::uint32_t body;
+  Vector3<Scalar> shift;
+};
+
+template <Real Scalar>
+struct CorrectionReport {
+  int iterations = 0;
+  Scalar largestOverlap = Scalar(0);  ///< [m] before
+  Scalar residual = Scalar(0);        ///< [m] largest move of the last sweep
+};
+
+/// Nonlinear projected Gauss-Seidel over the colours of the contacts: in turn each contact that is still
+/// closer than it should be is opened along its present normal, by inverse mass, so that the common centre of
+/// mass of movable bodies stays to rounding. Distances are recomputed from the moved positions; only relative
+/// displacements enter, so that a place far from the origin costs no digits.
+template <Real S>
+class PositionalCorrection {
+ public:
+  /// Moves the bodies so that each overlap is (1 - factor) of what it was, down to the slop, unless the cap
+  /// holds it back.
+  /// \param colouring of these contacts
+  template <ContactBodies B>
+  CorrectionReport<S> apply(std::span<const Contact<S>> contacts, const ContactColoring& colouring, B& bodies,
+                            const CorrectionSettings<S>& settings) {
+    moved_.clear();
+    CorrectionReport<S> report;
+    prepare(contacts, colouring, bodies, settings, report);
+    if (!(report.largestOverlap > S(0)) || !(settings.factor > S(0))) {
+      return report;
+    }
+    const S enough = settings.tolerance * report.largestOverlap;
+    do {
+      report.residual = S(0);
+      for (std::size_t c = 0; c <= colouring.colours(); ++c) {
+        // Lone contacts go with the first colour, and are right after one sweep.
+        const std::size_t begin = c == 0 ? 0 : colouring.begin(c);
+        const S largest = sweep(begin, colouring.end(c), c < colouring.colours());
+        report.residual = std::max<S>(report.residual, largest);
+      }
+      ++report.iterations;
+    } while (report.residual > enough && report.iterations < settings.maxIterations);
+    auto&& positions = bodies.positions();
+    for (std::uint32_t slot = 0; slot < colouring.bodies().size(); ++slot) {
+      const Vector3<S>& shift = shifts_[slot].d;
+      if (shift != Vector3<S>::Zero()) {
+        const std::uint32_t i = colouring.bodies()[slot];
+        positions[i] += shift;
+        moved_.push_back({i, shift});
+      }
+    }
+    return report;
+  }
+
+  /// Who was moved by the last call, in the order of contacts.
+  const std::vector<Displacement<S>>& displacements() const { return moved_; }
+
+ private:
+  struct Shift {
+    Vector3<S> d;
+    S mass;  ///< 0 for immovable
+  };
+  struct Row {
+    Vector3<S> r;  ///< from the first centre to the second at detection; to a boundary: its normal
+    Vector3<S> n;
+    S reach;  ///< distance at which the overlap is what shall remain
+    S share1;
+    S share2;
+    std::uint32_t slot1;
+    std::uint32_t slot2;
+    bool boundary;
+  };
+  static constexpr std::size_t chunk = 1024;
+
+  template <class B>
+  void prepare(std::span<const Contact<S>> contacts, const ContactColoring& colouring, const B& bodies,
+               const CorrectionSettings<S>& settings, CorrectionReport<S>& report) {
+    const std::size_t n = colouring.bodies().size();
+    shifts_.resize(n + 1);
+    for (std::uint32_t slot = 0; slot <= n; ++slot) {
+      shifts_[slot].d = Vector3<S>::Zero();
+      shifts_[slot].mass = colouring.movable(slot) ? S(bodies.masses()[colouring.bodies()[slot]]) : S(0);
+    }
+    rows_.resize(contacts.size());
+    for (std::size_t k = 0; k < rows_.size(); ++k) {
+      const ContactColoring::Row& place = colouring.rows()[k];
+      const Contact<S>& c = contacts[place.contact];
+      const S overlap = -c.gap;
+      report.largestOverlap = std::max<S>(report.largestOverlap, overlap);
+      const bool boundary = c.second == staticPartner;
+      const S r1 = bodies.radii()[c.first];
+      const S r2 = boundary ? r1 : S(bodies.radii()[c.second]);
+      const S smaller = r1 > S(0) && r2 > S(0) ? std::min<S>(r1, r2) : std::max<S>(r1, r2);
+      const S kept =
+          std::max<S>(overlap - settings.cap * smaller,
+                      std::max<S>((S(1) - settings.factor) * overlap, std::min<S>(settings.slop, overlap)));
+      const S m1 = shifts_[place.slot1].mass;
+      const S m2 = shifts_[place.slot2].mass;
+      const MassShares<S> shares = massShares<S>(m1, m1 > S(0), m2, m2 > S(0));
+      const S distance = boundary ? S(0) : c.arm1 + c.arm2;
+      rows_[k] = Row{Vector3<S>(distance * c.normal),
+                     c.normal,
+                     distance - c.gap - kept,
+                     shares.first,
+                     shares.second,
+                     place.slot1,
+                     place.slot2,
+                     boundary};
+      if (boundary) {
+        rows_[k].reach = overlap - kept;  // travel along the normal that remains to be made
+      }
+    }
+  }
+
+  S sweep(std::size_t begin, std::size_t end, bool disjoint) {
+    if (!disjoint || end - begin < 4 * chunk || threadCount() == 1) {
+      return open(begin, end);
+    }
+    changes_.assign((end - begin + chunk - 1) / chunk, S(0));
+    parallelForChunks(end - begin, chunk, [&](std::size_t from, std::size_t to) {
+      changes_[from / chunk] = open(begin + from, begin + to);
+    });
+    return *std::max_element(changes_.begin(), changes_.end());
+  }
+
+  S open(std::size_t begin, std::size_t end) {
+    S largest(0);
+    for (std::size_t k = begin; k < end; ++k) {
+      const Row& row = rows_[k];
+      Shift& b1 = shifts_[row.slot1];
+      Shift& b2 = shifts_[row.slot2];
+      const Vector3<S> d = b2.d - b1.d;
+      Vector3<S> n = row.n;
+      S missing(0);
+      if (row.boundary) {
+        missing = row.reach - n.dot(d);
+      } else {
+        const Vector3<S> r = row.r + d;
+        const S distance = detail::safeNorm(r);
+        missing = row.reach - distance;
+        if (distance > Eigen::NumTraits<S>::epsilon() * row.reach) {
+          n = detail::safeUnit(r);
+        }
+      }
+      if (!(missing > S(0))) {
+        continue;
+      }
+      largest = std::max<S>(largest, missing);
+      if (row.share1 > S(0)) {  // immovable bodies are shared between threads: never written
+        b1.d -= (row.share1 * missing) * n;
+      }
+      if (row.share2 > S(0)) {
+        b2.d += (row.share2 * missing) * n;
+      }
+    }
+    return largest;
+  }
+
+  std::vector<Shift> shifts_;
+  std::vector<Row> rows_;
+  std::vector<S> changes_;
+  std::vector<Displacement<S>> moved_;
+};
+
+}  // namespace gravel
