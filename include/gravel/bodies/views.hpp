@@ -40,6 +40,30 @@ struct Eigen::internal::traits<gravel::BasicQuaternionView<S, IsConst>>
   enum { Alignment = 0, Flags = IsConst ? 0 : Eigen::LvalueBit };
 };
 
+/// Eigen's packed products and conjugates of quaternions read four adjacent coefficients, whatever the map
+/// says. Products with a view take its general ones instead; no architecture has the number -1.
+namespace Eigen::internal {
+
+template <class T>
+inline constexpr bool isGravelView = false;
+template <class S, bool IsConst>
+inline constexpr bool isGravelView<gravel::BasicQuaternionView<S, IsConst>> = true;
+
+template <class A, class B>
+  requires(isGravelView<A> || isGravelView<B>)
+struct quat_product<Architecture::Target, A, B, float> : quat_product<-1, A, B, float> {};
+template <class A, class B>
+  requires(isGravelView<A> || isGravelView<B>)
+struct quat_product<Architecture::Target, A, B, double> : quat_product<-1, A, B, double> {};
+template <class A>
+  requires(isGravelView<A>)
+struct quat_conj<Architecture::Target, A, float> : quat_conj<-1, A, float> {};
+template <class A>
+  requires(isGravelView<A>)
+struct quat_conj<Architecture::Target, A, double> : quat_conj<-1, A, double> {};
+
+}  // namespace Eigen::internal
+
 namespace gravel {
 
 template <Real S, bool IsConst>
