@@ -9,12 +9,12 @@ namespace gravel {
 
 /// The law and its threshold. Distances enter squared and softened, s = r^2 + epsilon^2.
 ///
-/// Unsoftened points closer than sqrt(tiny) attract like a homogeneous sphere of that radius: the force goes to
-/// zero with the distance instead of to infinity, coincident points exert none, and action stays reaction.
+/// Unsoftened points closer than sqrt(tiny) attract like a homogeneous sphere of that radius: the force goes
+/// to zero with the distance instead of to infinity, coincident points exert none, and action stays reaction.
 template <Real S>
 struct PairLaw {
-  /// Squared length, in units of the system's extent, below which two points count as one: distances of 1e-100
-  /// in double, 1e-12 in float. Chosen so that s^(-3/2) stays in range.
+  /// Squared length, in units of the system's extent, below which two points count as one: distances of
+  /// 1e-100 in double, 1e-12 in float. Chosen so that s^(-3/2) stays in range.
   static S tiny() {
     if constexpr (std::is_same_v<S, float>) {
       return 1e-24F;
