@@ -120,12 +120,16 @@ class Bodies {
   /// storage stays the same object: a user's arrays are written to.
   template <class Other>
   void assign(const Bodies<Scalar, Other>& other) {
+    decltype(index_) index;
+    index.reserve(other.size());
+    for (std::size_t i = 0; i < other.size(); ++i) {
+      index.emplace(toInteger(other[i].id()), i);
+    }
     storage_.resize(other.size());
-    index_.clear();
     for (std::size_t i = 0; i < size(); ++i) {
       detail::copyBody(storage_, i, other.storage(), i);
-      index_.emplace(toInteger(other[i].id()), i);
     }
+    index_.swap(index);
     skipIds(other.nextId());
     ++revision_;
   }

@@ -23,6 +23,7 @@ struct ContactSettings {
   Scalar tolerance = Scalar(1e-6);
   int maxIterations = 100;  ///< >= 1: sweeps at most
   bool warmStart = true;    ///< begin from the impulses of the last step
+  bool accelerate = true;   ///< conjugate steps between sweeps; off: plain Gauss-Seidel
 };
 
 /// What a solve did.
@@ -71,6 +72,7 @@ struct SolverRow {
   std::uint32_t slot2;
   std::uint32_t contact;
   std::uint32_t slides;  ///< how often it went from sticking to sliding
+  bool sliding;
 };
 
 template <Real S>
@@ -242,6 +244,7 @@ class ContactProblem {
     row.slot2 = place.slot2;
     row.contact = place.contact;
     row.slides = 0;
+    row.sliding = false;
     row.jn = S(0);
     row.jt = Vector3<S>::Zero();
     row.c1 = ratio(c.arm1, source.radii()[c.first]);

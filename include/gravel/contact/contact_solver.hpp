@@ -59,16 +59,22 @@ class ContactSolver {
     settings_ = settings;
   }
 
-  /// Changes the velocities (and, where there is friction, the spins) of the bodies so that every contact
-  /// obeys restitution and Coulomb's law.
-  /// \param contacts sorted by keys; kept as a view for correctPositions() and contacts()
-  /// \param dt [s] >= 0, the step for which the contacts stand
+  /// Takes the contacts of a step and colours them; solve() and correctPositions() follow in either order.
+  /// \param contacts sorted by keys; kept as a view, whose geometry may be renewed before solve()
   template <ContactBodies B>
-  ContactReport<S> solve(std::span<const Contact<S>> contacts, B& bodies, const S& dt) {
+  void begin(std::span<const Contact<S>> contacts, const B& bodies) {
     contacts_ = contacts;
     impulses_.assign(contacts.size(), ContactImpulse<S>{});
-    ContactReport<S> report;
     coloring_.build(contacts, bodies);
+  }
+
+  /// Changes the velocities (and, where there is friction, the spins) of the bodies so that every contact
+  /// of begin() obeys restitution and Coulomb's law.
+  /// \param dt [s] >= 0, the step for which the contacts stand
+  template <ContactBodies B>
+  ContactReport<S> solve(B& bodies, const S& dt) {
+    const std::span<const Contact<S>> contacts = contacts_;
+    ContactReport<S> report;
     if (!contacts.empty()) {
       problem_.gather(contacts, bodies, coloring_, dt, settings_);
       if (problem_.active) {
@@ -86,7 +92,14 @@ class ContactSolver {
     return report;
   }
 
-  /// Opens the overlaps of the contacts of the last solve() by moving bodies.
+  /// begin() and solve() in one.
+  template <ContactBodies B>
+  ContactReport<S> solve(std::span<const Contact<S>> contacts, B& bodies, const S& dt) {
+    begin(contacts, bodies);
+    return solve(bodies, dt);
+  }
+
+  /// Opens the overlaps of the contacts of begin() by moving bodies.
   template <ContactBodies B>
   CorrectionReport<S> correctPositions(B& bodies, const CorrectionSettings<S>& settings) {
     return correction_.apply(contacts_, coloring_, bodies, settings);

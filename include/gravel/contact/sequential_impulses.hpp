@@ -22,65 +22,124 @@ class SequentialImpulses {
   ContactReport<S> solve(ContactProblem<S>& problem, const ContactColoring& colouring,
                          const ContactSettings<S>& settings) {
     ContactReport<S> report;
-    applyGuess(problem, colouring);
-    const std::size_t lone = colouring.loneCount();
-    eachOf(0, lone, [&](std::size_t k) { return strike(problem, problem.rows[k]); });
-    report.iterations = lone > 0 ? 1 : 0;
-    if (lone == problem.rows.size()) {
-      return report;  // exact
+    eachOf(0, colouring.loneCount(), [&](std::size_t k) { return strike(problem, problem.rows[k]); });
+    if (colouring.loneCount() == problem.rows.size()) {
+      report.iterations = 1;  // exact
+      return report;
     }
+    everyColour(colouring, [&](std::size_t k) { return applyGuess(problem, problem.rows[k]); });
     const S enough = settings.tolerance * problem.largestApproach;
-    S change(0);
-    int sweep = 0;
-    do {
-      change = problem.friction ? sweepOnce<true>(problem, colouring) : sweepOnce<false>(problem, colouring);
-      ++sweep;
-    } while (change > enough && sweep < settings.maxIterations);
-    report.iterations = sweep;
-    report.residual = problem.largestApproach > S(0) ? change / problem.largestApproach : S(0);
-    return report;
+    const bool friction = problem.friction;
+    Progress last;
+    S beta(0);
+    begin(problem);
+    while (true) {
+      const Progress now = everyColour(colouring, [&](std::size_t k) {
+        Row& row = problem.rows[k];
+        return friction ? relax<true>(problem, row, steps_[k], beta)
+                        : relax<false>(problem, row, steps_[k], beta);
+      });
+      ++report.iterations;
+      report.residual = now.change / problem.largestApproach;
+      if (!(now.change > enough) || report.iterations >= settings.maxIterations) {
+        return report;
+      }
+      // Fletcher & Reeves; a step that did not shrink the change starts anew.
+      beta = settings.accelerate && now.size < last.size ? now.size / last.size : S(0);
+      last = now;
+      if (settings.accelerate) {
+        coast(problem, beta);
+      }
+    }
   }
 
  private:
   using Row = detail::SolverRow<S>;
   using Body = detail::SolverBody<S>;
   static constexpr std::size_t chunk = 512;
-  static constexpr std::size_t worthThreads = 4 * chunk;
-  static constexpr std::uint32_t patience = 3;
+  static constexpr std::uint32_t patience = 8;
 
-  /// Calls f(k) -> change for rows that share no movable body; the largest change.
-  template <class F>
-  S eachOf(std::size_t begin, std::size_t end, F&& f) {
-    S largest(0);
-    if (end - begin < worthThreads || threadCount() == 1) {
-      for (std::size_t k = begin; k < end; ++k) {
-        largest = std::max<S>(largest, f(k));
-      }
-      return largest;
+  /// What a sweep did: largest change of a velocity, and the sum of the squares of the impulses over mass.
+  struct Progress {
+    S change = S(0);
+    S size = S(0);
+    Progress& operator+=(const Progress& other) {
+      change = std::max<S>(change, other.change);
+      size += other.size;
+      return *this;
     }
-    changes_.assign((end - begin + chunk - 1) / chunk, S(0));
-    parallelForChunks(end - begin, chunk, [&](std::size_t from, std::size_t to) {
-      S mine(0);
-      for (std::size_t k = begin + from; k < begin + to; ++k) {
-        mine = std::max<S>(mine, f(k));
-      }
-      changes_[from / chunk] = mine;
+  };
+
+  /// Last change and search direction of a contact's impulse; and of a body's velocities.
+  struct Step {
+    S dn = S(0);
+    S pn = S(0);
+    Vector3<S> dt = Vector3<S>::Zero();
+    Vector3<S> pt = Vector3<S>::Zero();
+  };
+  struct BodyStep {
+    Vector3<S> v;
+    Vector3<S> s;
+    Vector3<S> pv = Vector3<S>::Zero();
+    Vector3<S> ps = Vector3<S>::Zero();
+  };
+
+  void begin(const ContactProblem<S>& problem) {
+    steps_.assign(problem.rows.size(), Step{});
+    bodySteps_.resize(problem.bodies.size());
+    parallelFor(problem.bodies.size(), 4 * chunk, [&](std::size_t slot) {
+      bodySteps_[slot] = BodyStep{problem.bodies[slot].v, problem.bodies[slot].s};
     });
-    return *std::max_element(changes_.begin(), changes_.end());
   }
 
-  template <bool Friction>
-  S sweepOnce(ContactProblem<S>& problem, const ContactColoring& colouring) {
-    S largest(0);
-    const auto relaxRow = [&](std::size_t k) { return relax<Friction>(problem, problem.rows[k]); };
+  /// Velocities follow the impulses' step along the search direction: they are linear in the impulses.
+  void coast(ContactProblem<S>& problem, const S& beta) {
+    parallelFor(problem.bodies.size(), 4 * chunk, [&](std::size_t slot) {
+      BodyStep& step = bodySteps_[slot];
+      Body& b = problem.bodies[slot];
+      const Vector3<S> pv = beta * step.pv;
+      const Vector3<S> dv = b.v - step.v;
+      b.v += pv;
+      step.pv = pv + dv;
+      step.v = b.v;
+      if (problem.friction) {
+        const Vector3<S> ps = beta * step.ps;
+        const Vector3<S> ds = b.s - step.s;
+        b.s += ps;
+        step.ps = ps + ds;
+        step.s = b.s;
+      }
+    });
+  }
+
+  /// Calls f(k) for rows that share no movable body; chunks depend on their number alone.
+  template <class F>
+  Progress eachOf(std::size_t begin, std::size_t end, F&& f) {
+    const auto run = [&](std::size_t from, std::size_t to) {
+      Progress mine;
+      for (std::size_t k = from; k < to; ++k) {
+        mine += f(k);
+      }
+      return mine;
+    };
+    if (end - begin < 4 * chunk) {  // not worth the threads
+      return run(begin, end);
+    }
+    return orderedSum(end - begin, chunk, Progress{},
+                      [&](std::size_t from, std::size_t to) { return run(begin + from, begin + to); });
+  }
+
+  template <class F>
+  Progress everyColour(const ContactColoring& colouring, F&& f) {
+    Progress all;
     for (std::size_t c = 0; c < colouring.colours(); ++c) {
-      largest = std::max<S>(largest, eachOf(colouring.begin(c), colouring.end(c), relaxRow));
+      all += eachOf(colouring.begin(c), colouring.end(c), f);
     }
     const std::size_t overflow = colouring.colours();
     for (std::size_t k = colouring.begin(overflow); k < colouring.end(overflow); ++k) {
-      largest = std::max<S>(largest, relaxRow(k));
+      all += f(k);
     }
-    return largest;
+    return all;
   }
 
   static void push(Body& b1, Body& b2, const Vector3<S>& j) {
@@ -102,38 +161,25 @@ class SequentialImpulses {
     }
   }
 
-  /// First guesses become velocities; rows without one cost a look.
-  void applyGuess(ContactProblem<S>& problem, const ContactColoring& colouring) {
-    for (std::size_t c = 0; c <= colouring.colours(); ++c) {
-      const auto apply = [&](std::size_t k) {
-        const Row& row = problem.rows[k];
-        if (row.jn > S(0)) {
-          Body& b1 = problem.bodies[row.slot1];
-          Body& b2 = problem.bodies[row.slot2];
-          push(b1, b2, Vector3<S>(row.jn * row.n + row.jt));
-          if (problem.friction) {
-            twist(row, b1, b2, row.jt);
-          }
-        }
-        return S(0);
-      };
-      if (c < colouring.colours()) {
-        eachOf(colouring.begin(c), colouring.end(c), apply);
-      } else {
-        for (std::size_t k = colouring.begin(c); k < colouring.end(c); ++k) {
-          apply(k);
-        }
+  static Progress applyGuess(ContactProblem<S>& problem, const Row& row) {
+    if (row.jn > S(0)) {
+      Body& b1 = problem.bodies[row.slot1];
+      Body& b2 = problem.bodies[row.slot2];
+      push(b1, b2, Vector3<S>(row.jn * row.n + row.jt));
+      if (problem.friction) {
+        twist(row, b1, b2, row.jt);
       }
     }
+    return {};
   }
 
   /// A contact alone: in two strokes, stop and rebound, so that a head-on blow ends at exactly its target.
-  static S strike(ContactProblem<S>& problem, Row& row) {
+  static Progress strike(ContactProblem<S>& problem, Row& row) {
     Body& b1 = problem.bodies[row.slot1];
     Body& b2 = problem.bodies[row.slot2];
     const S v_n = detail::normalVelocity(row, b1, b2);
     if (!(v_n < row.target)) {
-      return S(0);
+      return {};
     }
     const S share1 = b1.inverseMass / (b1.inverseMass + b2.inverseMass);
     const S share2 = b2.inverseMass / (b1.inverseMass + b2.inverseMass);
@@ -147,56 +193,71 @@ class SequentialImpulses {
       }
     }
     if (row.staticFriction > S(0)) {
-      rub(row, b1, b2);
+      Vector3<S> unused = Vector3<S>::Zero();
+      rub(row, b1, b2, unused);
     }
-    return S(0);
+    return {};
   }
 
+  /// First along the search direction of the step before, then to where this contact is right.
   template <bool Friction>
-  static S relax(ContactProblem<S>& problem, Row& row) {
+  static Progress relax(ContactProblem<S>& problem, Row& row, Step& step, const S& beta) {
     Body& b1 = problem.bodies[row.slot1];
     Body& b2 = problem.bodies[row.slot2];
-    const S jn = row.jn + row.normalMass * (row.target - detail::normalVelocity(row, b1, b2));
-    const S before = row.jn;
-    row.jn = jn > S(0) ? jn : S(0);
-    S change(0);
-    if (row.jn != before) {
-      const S dj = row.jn - before;
-      push(b1, b2, Vector3<S>(dj * row.n));
-      change = (dj < S(0) ? S(-dj) : dj) / row.normalMass;
+    const S jn = row.jn + beta * step.pn;
+    step.pn = beta * step.pn + step.dn;
+    const S next = jn + row.normalMass * (row.target - detail::normalVelocity(row, b1, b2));
+    row.jn = next > S(0) ? next : S(0);
+    step.dn = row.jn - jn;
+    Progress progress;
+    if (step.dn != S(0)) {
+      push(b1, b2, Vector3<S>(step.dn * row.n));
+      const S change = step.dn / row.normalMass;
+      progress.change = change < S(0) ? S(-change) : change;
+      progress.size = step.dn * change;
     }
     if constexpr (Friction) {
-      if (row.staticFriction > S(0) && (row.jn > S(0) || before > S(0))) {
-        change = std::max<S>(change, rub(row, b1, b2));
+      if (row.staticFriction > S(0)) {
+        const Vector3<S> pt = beta * step.pt;
+        row.jt += pt;
+        step.pt = pt + step.dt;
+        if (row.jn > S(0) || row.jt != Vector3<S>::Zero()) {
+          progress += rub(row, b1, b2, step.dt);
+        } else {
+          step.dt = Vector3<S>::Zero();
+        }
       }
     }
-    return change;
+    return progress;
   }
 
-  /// Friction of a row for its normal impulse. \return change of slip
-  static S rub(Row& row, Body& b1, Body& b2) {
+  /// Friction of a row for its normal impulse.
+  static Progress rub(Row& row, Body& b1, Body& b2, Vector3<S>& dj) {
     const Vector3<S> slip = detail::slipVelocity(row, b1, b2);
     Vector3<S> jt = row.jt - row.tangentialMass * Vector3<S>(slip - row.slipTarget);
     // A contact that keeps changing its mind between sticking and sliding slides: sweeps must end.
     const S stick = (row.slides < patience ? row.staticFriction : row.kineticFriction) * row.jn;
     const S size = detail::safeNorm(jt);
     if (size > stick) {
-      const S slide = row.kineticFriction * row.jn;
-      row.slides += detail::safeNorm(row.jt) > slide ? 1U : 0U;
-      jt *= slide / size;
+      row.slides += row.sliding ? 0U : 1U;
+      row.sliding = true;
+      jt *= row.kineticFriction * row.jn / size;
+    } else {
+      row.sliding = false;
     }
-    const Vector3<S> dj = jt - row.jt;
+    dj = jt - row.jt;
     row.jt = jt;
     const S change = detail::safeNorm(dj);
     if (!(change > S(0))) {
-      return S(0);
+      return {};
     }
     push(b1, b2, dj);
     twist(row, b1, b2, dj);
-    return change / row.tangentialMass;
+    return {S(change / row.tangentialMass), S(change * change / row.tangentialMass)};
   }
 
-  std::vector<S> changes_;
+  std::vector<Step> steps_;
+  std::vector<BodyStep> bodySteps_;
 };
 
 }  // namespace gravel

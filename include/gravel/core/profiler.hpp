@@ -45,8 +45,8 @@ class Profiler {
     const char* reason = nullptr;  ///< why it was skipped the last time; a string literal
   };
 
-  /// Times the rest of the enclosing scope. Where scopes nest, the outer one's clock stands still meanwhile, so
-  /// that the seconds of all phases add up to the time passed.
+  /// Times the rest of the enclosing scope. Where scopes nest, the outer one's clock stands still meanwhile,
+  /// so that the seconds of all phases add up to the time passed.
   class Scope {
    public:
     Scope(Profiler& profiler, Phase phase) : profiler_(profiler), outer_(profiler.running_) {

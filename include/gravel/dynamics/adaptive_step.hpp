@@ -75,16 +75,17 @@ Scalar stepFromMotion(const Bodies<Scalar, Layout>& bodies, const Scalar& soften
       mass > Scalar(0) ? Vector3<Scalar>(momentum / mass) : Vector3<Scalar>(Vector3<Scalar>::Zero());
   const Scalar spacing = Vector3<Scalar>(high - low).norm() / Scalar(cbrt(static_cast<double>(n)));
   const Scalar floor = std::max<Scalar>(softening, spacing / Scalar(100));
-  const Scalar least = detail::orderedMin(n, 2048, Scalar(limits.largest / limits.factor), [&](std::size_t i) {
-    const auto body = bodies[i];
-    const Scalar a = Vector3<Scalar>(body.acceleration()).norm();
-    if (body.isFixed() || !(a > Scalar(0))) {
-      return Scalar(limits.largest / limits.factor);
-    }
-    const Scalar l = std::max<Scalar>(body.radius(), floor);
-    const Scalar v_sq = Vector3<Scalar>(body.velocity() - v_cm).squaredNorm();
-    return Scalar(sqrt(v_sq + a * l) / a);
-  });
+  const Scalar least =
+      detail::orderedMin(n, 2048, Scalar(limits.largest / limits.factor), [&](std::size_t i) {
+        const auto body = bodies[i];
+        const Scalar a = Vector3<Scalar>(body.acceleration()).norm();
+        if (body.isFixed() || !(a > Scalar(0))) {
+          return Scalar(limits.largest / limits.factor);
+        }
+        const Scalar l = std::max<Scalar>(body.radius(), floor);
+        const Scalar v_sq = Vector3<Scalar>(body.velocity() - v_cm).squaredNorm();
+        return Scalar(sqrt(v_sq + a * l) / a);
+      });
   return std::clamp<Scalar>(limits.factor * least, limits.smallest, limits.largest);
 }
 

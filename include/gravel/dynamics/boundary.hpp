@@ -10,8 +10,8 @@
 
 namespace gravel {
 
-/// The half-space n.x >= offset is free; bodies rest on its face. n has unit length. The material is looked up
-/// when contacts are made, so that it may change.
+/// The half-space n.x >= offset is free; bodies rest on its face. n has unit length. The material is looked
+/// up when contacts are made, so that it may change.
 template <Real Scalar>
 struct Plane {
   Vector3<Scalar> normal;

@@ -4,8 +4,8 @@
 /// Drag in proportion to velocity, dv/dt = -c v and dw/dt = -c_w w, solved exactly: v(t+h) = v(t) exp(-c h).
 /// No step is too long for it, and two half steps equal one step.
 
-#include <gravel/core/parallel.hpp>
 #include <gravel/bodies/bodies.hpp>
+#include <gravel/core/parallel.hpp>
 
 namespace gravel {
 

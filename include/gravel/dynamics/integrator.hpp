@@ -34,13 +34,13 @@ struct IntegratorTraits {
 namespace detail {
 inline constexpr std::array<long double, 1> verletWeights{1.0L};
 // w = 1/(2 - 2^(1/3)), 1 - 2w, w
-inline constexpr std::array<long double, 3> yoshida4Weights{
-    1.351207191959657634047687808971460827L, -1.702414383919315268095375617942921653L,
-    1.351207191959657634047687808971460827L};
+inline constexpr std::array<long double, 3> yoshida4Weights{1.351207191959657634047687808971460827L,
+                                                            -1.702414383919315268095375617942921653L,
+                                                            1.351207191959657634047687808971460827L};
 // Hairer, Lubich & Wanner, Geometric Numerical Integration, 2nd ed., eq. V.3.11
 inline constexpr std::array<long double, 7> yoshida6Weights{
-    0.78451361047755726381949763L,  0.23557321335935813368479318L, -1.17767998417887100694641568L,
-    1.31518632068391121888424973L,  -1.17767998417887100694641568L, 0.23557321335935813368479318L,
+    0.78451361047755726381949763L, 0.23557321335935813368479318L,  -1.17767998417887100694641568L,
+    1.31518632068391121888424973L, -1.17767998417887100694641568L, 0.23557321335935813368479318L,
     0.78451361047755726381949763L};
 }  // namespace detail
 
@@ -109,9 +109,9 @@ void kickAndDrift(Bodies<Scalar, Layout>& bodies, const Scalar& kick, const Scal
 
 }  // namespace detail
 
-/// Advances all bodies by one step h. Accelerations must be those of the present positions, and are at the end.
-/// \param forces  called s times with the part of h that has passed [s]: accelerations at the present positions
-/// \param arrival called once, when positions are final and the last forces are not yet evaluated
+/// Advances all bodies by one step h. Accelerations must be those of the present positions, and are at the
+/// end. \param forces  called s times with the part of h that has passed [s]: accelerations at the present
+/// positions \param arrival called once, when positions are final and the last forces are not yet evaluated
 /// Cost: s force evaluations, s + 1 passes over the bodies. Bits do not depend on the number of threads.
 template <Real Scalar, class Layout, class Forces, class Arrival>
 void integrate(IntegratorKind kind, Bodies<Scalar, Layout>& bodies, const Scalar& h, bool torques,

@@ -21,7 +21,8 @@ struct EnergyLedger {
   Scalar damping = Scalar(0);      ///< taken by linear and angular damping
   Scalar correction = Scalar(0);   ///< taken by positional correction; mostly negative: it lifts bodies
   Scalar work = Scalar(0);         ///< minus the work of the user's own force
-  Scalar exchange = Scalar(0);     ///< left with removed bodies (minus: came with new ones) and with changed settings
+  Scalar exchange =
+      Scalar(0);  ///< left with removed bodies (minus: came with new ones) and with changed settings
 
   Scalar mechanical() const { return kinetic + rotational + potential; }
   Scalar dissipated() const { return restitution + friction + damping + correction + work + exchange; }

@@ -102,20 +102,19 @@ class SnapshotReader {
   }
 
   template <class T>
-    requires std::is_trivially_copyable_v<T>
-  std::vector<T> array(const std::string& name) {
-    std::uint64_t head[3] = {};
-    take(head, sizeof head, name);
-    std::string found(head[0] <= bytes_.size() - at_ ? static_cast<std::size_t>(head[0]) : 0, '\0');
-    take(found.data(), found.size(), name);
-    if (found != name || head[1] != sizeof(T) || head[2] > (bytes_.size() - at_) / sizeof(T)) {
-      fail("holds '" + found + "' of " + std::to_string(head[1]) + " bytes where '" + name + "' of " +
-           std::to_string(sizeof(T)) + " is expected: another Scalar or version");
+    requires std::is_trivially_copyable_v<T> std::vector<T> array(const std::string& name) {
+      std::uint64_t head[3] = {};
+      take(head, sizeof head, name);
+      std::string found(head[0] <= bytes_.size() - at_ ? static_cast<std::size_t>(head[0]) : 0, '\0');
+      take(found.data(), found.size(), name);
+      if (found != name || head[1] != sizeof(T) || head[2] > (bytes_.size() - at_) / sizeof(T)) {
+        fail("holds '" + found + "' of " + std::to_string(head[1]) + " bytes where '" + name + "' of " +
+             std::to_string(sizeof(T)) + " is expected: another Scalar or version");
+      }
+      std::vector<T> values(static_cast<std::size_t>(head[2]));
+      take(values.data(), values.size() * sizeof(T), name);
+      return values;
     }
-    std::vector<T> values(static_cast<std::size_t>(head[2]));
-    take(values.data(), values.size() * sizeof(T), name);
-    return values;
-  }
 
   template <class T>
   T value(const std::string& name) {

@@ -81,6 +81,15 @@ class ForceStage {
     return power;
   }
 
+  /// Force of gravity and field on body i, without the user's own [N].
+  Vector3<Scalar> conservativeForce(const Bodies<Scalar, Layout>& bodies, std::size_t i) const {
+    Vector3<Scalar> force = bodies.forces()[i];
+    if (hook && i < hookForces_.size()) {
+      force -= hookForces_[i];
+    }
+    return force;
+  }
+
  private:
   const char* reasonToSkip(const Bodies<Scalar, Layout>& bodies, const Scalar& G) const {
     if (G == Scalar(0)) {

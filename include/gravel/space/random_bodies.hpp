@@ -13,8 +13,8 @@ namespace gravel {
 
 /// n spheres that do not overlap, of radii 0.5 m to 1 m and the given density [kg m^-3], spread over a ball
 /// about the origin with about a quarter of its volume filled; speeds up to 0.1 m s^-1 and spins up to
-/// 0.1 rad s^-1 along each axis. They sit on a jittered cubic lattice, so that no two can touch. Equal arguments
-/// give equal bodies on every machine.
+/// 0.1 rad s^-1 along each axis. They sit on a jittered cubic lattice, so that no two can touch. Equal
+/// arguments give equal bodies on every machine.
 template <Real Scalar>
 std::vector<Body<Scalar>> randomBodies(std::size_t n, const Scalar& density, std::uint64_t seed) {
   constexpr double largest = 1.0;

@@ -18,26 +18,26 @@ namespace gravel {
 /// Choices for a run. An aggregate: fill it with designated initialisers or field by field.
 template <Real Scalar = double>
 struct SimulationConfig {
-  std::size_t bodyCount = 0;         ///< random bodies made at the start
-  Scalar density = Scalar(2000);     ///< [kg m^-3] of the random bodies
-  unsigned int seed = 1;             ///< of the random bodies: equal seeds, equal bodies
-  Scalar G = Scalar(6.6743e-11);     ///< [m^3 kg^-1 s^-2], CODATA 2018; 0 switches gravity off
-  Scalar softening = Scalar(0);      ///< [m] Plummer length of the gravity of every pair
+  std::size_t bodyCount = 0;               ///< random bodies made at the start
+  Scalar density = Scalar(2000);           ///< [kg m^-3] of the random bodies
+  unsigned int seed = 1;                   ///< of the random bodies: equal seeds, equal bodies
+  Scalar G = Scalar(6.6743e-11);           ///< [m^3 kg^-1 s^-2], CODATA 2018; 0 switches gravity off
+  Scalar softening = Scalar(0);            ///< [m] Plummer length of the gravity of every pair
   Scalar gravityTolerance = Scalar(1e-5);  ///< relative rms force error that gravity may have
   GravityKind gravity = GravityKind::Automatic;
-  Scalar timeStep = Scalar(1e-3);    ///< [s] the step; the longest one where steps adapt
-  bool adaptiveTimeStep = true;      ///< shorten steps as velocities and accelerations ask
-  Scalar minTimeStep = Scalar(0);    ///< [s] adaptive steps are not shorter; at most timeStep
+  Scalar timeStep = Scalar(1e-3);        ///< [s] the step; the longest one where steps adapt
+  bool adaptiveTimeStep = true;          ///< shorten steps as velocities and accelerations ask
+  Scalar minTimeStep = Scalar(0);        ///< [s] adaptive steps are not shorter; at most timeStep
   Scalar timeStepFactor = Scalar(0.02);  ///< adaptive step over the time in which motion changes
   IntegratorKind integrator = IntegratorKind::VelocityVerlet;
-  Scalar epsilon = Scalar(1e-12);    ///< lengths [m] and speeds [m s^-1] below it count as zero
-  Scalar coeffRestitution = Scalar(0.5);        ///< approach speed kept in a hit; 1 keeps all
-  Scalar restitutionThreshold = Scalar(0);      ///< [m s^-1] slower hits do not bounce
-  Scalar coeffFriction = Scalar(0.3);           ///< kinetic: sliding force over normal force
-  Scalar coeffStaticFriction = Scalar(0.4);     ///< least force that starts a slide, over normal force
-  Scalar tangentialRestitution = Scalar(0);     ///< slip speed that a sticking hit turns back
-  Scalar linearDamping = Scalar(0);             ///< [s^-1] dv/dt = -c v
-  Scalar angularDamping = Scalar(0);            ///< [s^-1] dw/dt = -c w
+  Scalar epsilon = Scalar(1e-12);            ///< lengths [m] and speeds [m s^-1] below it count as zero
+  Scalar coeffRestitution = Scalar(0.5);     ///< approach speed kept in a hit; 1 keeps all
+  Scalar restitutionThreshold = Scalar(0);   ///< [m s^-1] slower hits do not bounce
+  Scalar coeffFriction = Scalar(0.3);        ///< kinetic: sliding force over normal force
+  Scalar coeffStaticFriction = Scalar(0.4);  ///< least force that starts a slide, over normal force
+  Scalar tangentialRestitution = Scalar(0);  ///< slip speed that a sticking hit turns back
+  Scalar linearDamping = Scalar(0);          ///< [s^-1] dv/dt = -c v
+  Scalar angularDamping = Scalar(0);         ///< [s^-1] dw/dt = -c w
   Scalar positionalCorrectionFactor = Scalar(0.4);  ///< share of each overlap removed per step
   Scalar contactTolerance = Scalar(1e-6);  ///< contact sweeps end when speeds change by less, relative
   std::size_t contactIterations = 200;     ///< most contact sweeps per step
@@ -63,6 +63,14 @@ struct EnumNames;
 template <>
 struct EnumNames<IntegratorKind> {
   static constexpr std::array<std::string_view, 3> values{"VelocityVerlet", "Yoshida4", "Yoshida6"};
+};
+template <>
+struct EnumNames<GravityKind> {
+  static constexpr std::array<std::string_view, 2> values{"Automatic", "Direct"};
+};
+template <>
+struct EnumNames<BroadPhaseKind> {
+  static constexpr std::array<std::string_view, 4> values{"Automatic", "AllPairs", "KDTree", "Grid"};
 };
 
 /// Calls visit(setting, value) for every field of the config: values are Scalar, bool, std::size_t,

@@ -10,13 +10,13 @@ namespace gravel {
 
 template <Real Scalar, class Layout>
 Space<Scalar, Layout>::Space(const SimulationConfig<Scalar>& config)
-    : Settings<Scalar>(config), dt_(config.timeStep) {
-  initializeBodies(config.bodyCount, config.density, config.seed);
-}
+    : Space(config, typename Bodies::Storage()) {}
 
 template <Real Scalar, class Layout>
 Space<Scalar, Layout>::Space(const SimulationConfig<Scalar>& config, typename Bodies::Storage storage)
     : Settings<Scalar>(config), bodies_(std::move(storage)), dt_(config.timeStep) {
+  force_.gravity.setKind(config.gravity);
+  force_.gravity.setTolerance(config.gravityTolerance);
   initializeBodies(config.bodyCount, config.density, config.seed);
 }
 
@@ -31,8 +31,8 @@ void Space<Scalar, Layout>::initializeBodies(std::size_t n, Scalar dens, unsigne
 template <Real Scalar, class Layout>
 std::size_t Space<Scalar, Layout>::checkedIndex(std::size_t i) const {
   if (i >= n()) {
-    throw std::out_of_range("gravel: body index is " + std::to_string(i) + "; allowed: below n() = " +
-                            std::to_string(n()));
+    throw std::out_of_range("gravel: body index is " + std::to_string(i) +
+                            "; allowed: below n() = " + std::to_string(n()));
   }
   return i;
 }
@@ -60,7 +60,7 @@ void Space<Scalar, Layout>::removeBody(BodyId id) {
 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::reorderBodies() {
-  bodies_.reorder(mortonOrder<Scalar>(bodies_.positions()));
+  bodies_.reorder(mortonOrder(bodies_.positions()));
   rememberPlaces();  // forces moved along with their bodies
 }
 
@@ -101,7 +101,8 @@ void Space<Scalar, Layout>::checkGravityInDomain(const Scalar& G, const Domain<S
     detail::refuse("domain of a Space", "shear-periodic", "open or periodic");
   }
   if (!domain.isOpen() && !(G == Scalar(0))) {
-    detail::refuse("G in a periodic domain", detail::formatReal(G), "0: gravity sums over an open domain only");
+    detail::refuse("G in a periodic domain", detail::formatReal(G),
+                   "0: gravity sums over an open domain only");
   }
 }
 
@@ -154,8 +155,8 @@ Scalar Space<Scalar, Layout>::bindingEnergy(std::size_t i) const {
     for (std::size_t j = 0; j < n(); ++j) {
       if (j != i) {
         const Vector r_ij = Vector(bodies_[j].position()) - x;
-        energy += getG() * m * Scalar(bodies_[j].mass()) *
-                  pairPotential(Scalar(r_ij.squaredNorm()), this->config_.softening);
+        const Scalar s = r_ij.squaredNorm() + this->config_.softening * this->config_.softening;
+        energy -= getG() * m * Scalar(bodies_[j].mass()) * PairLaw<Scalar>::potentialFactor(s);
       }
     }
   }

@@ -29,8 +29,8 @@ EnergyLedger<Scalar> Space<Scalar, Layout>::energyLedger() const {
 }
 
 template <Real Scalar, class Layout>
-std::tuple<std::vector<Vector3<Scalar>>, std::vector<Quaternion<Scalar>>>
-Space<Scalar, Layout>::getAllBodyTransforms() const {
+auto Space<Scalar, Layout>::getAllBodyTransforms() const
+    -> std::tuple<std::vector<Vector>, std::vector<Quaternion<Scalar>>> {
   std::vector<Vector> positions(n());
   std::vector<Quaternion<Scalar>> orientations(n());
   for (std::size_t i = 0; i < n(); ++i) {
@@ -41,9 +41,9 @@ Space<Scalar, Layout>::getAllBodyTransforms() const {
 }
 
 template <Real Scalar, class Layout>
-std::tuple<std::vector<Vector3<Scalar>>, std::vector<Quaternion<Scalar>>, std::vector<Vector3<Scalar>>,
-           std::vector<Vector3<Scalar>>>
-Space<Scalar, Layout>::getDataForDisplay() const {
+auto Space<Scalar, Layout>::getDataForDisplay() const
+    -> std::tuple<std::vector<Vector>, std::vector<Quaternion<Scalar>>, std::vector<Vector>,
+                  std::vector<Vector>> {
   auto transforms = getAllBodyTransforms();
   std::vector<Vector> torques(n());
   std::vector<Vector> angularAccelerations(n());
@@ -76,9 +76,9 @@ void Space<Scalar, Layout>::logLine(const char* line) const {
   }
 }
 
-/// Logs energies every logFrequency steps. Warns when the total of the ledger, which only the error of the time
-/// integration changes, has moved by more than a tenth of the energy in play since the last line, or is not
-/// finite.
+/// Logs energies every logFrequency steps. Warns when the total of the ledger, which only the error of the
+/// time integration changes, has moved by more than a tenth of the energy in play since the last line, or is
+/// not finite.
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::logSystemEnergy(std::size_t iteration) {
   if (!this->config_.diagnosticsEnabled) {
@@ -150,11 +150,16 @@ void Space<Scalar, Layout>::save(const std::string& path) const {
       out.value(std::string("setting ") + setting.name, value);
     }
   });
-  detail::SpaceNumbers<Scalar> numbers{dt_,       previous_dt_,
-                                       time_,     timeRest_,
-                                       lastTotalEnergy_, hookPower_,
-                                       left_,     force_.field,
-                                       steps_,    toInteger(bodies_.nextId()),
+  detail::SpaceNumbers<Scalar> numbers{dt_,
+                                       previous_dt_,
+                                       time_,
+                                       timeRest_,
+                                       lastTotalEnergy_,
+                                       hookPower_,
+                                       left_,
+                                       force_.field,
+                                       steps_,
+                                       toInteger(bodies_.nextId()),
                                        ledgerOpen_ ? std::uint64_t{1} : std::uint64_t{0}};
   numbers.forEach([&](const char* name, const auto& value) { out.value(name, value); });
   contact_.save(out);
@@ -182,6 +187,8 @@ void Space<Scalar, Layout>::restore(const std::string& path) {
   bodies_.assign(bodies);
   this->config_ = config;
   contact_ = std::move(contact);
+  force_.gravity.setKind(config.gravity);
+  force_.gravity.setTolerance(config.gravityTolerance);
   force_.field = numbers.field;
   colors_.clear();
   dt_ = numbers.dt;

@@ -63,7 +63,7 @@ void Space<Scalar, Layout>::step(const Scalar& h, std::size_t iteration) {
       integrate(this->config_.integrator, bodies_, h, force_.hasTorques(), forces, arrival);
     }
     rememberPlaces();
-    left_.correction += contact_.separationWork(bodies_, force_);
+    left_.correction += contact_.separationWork(force_, bodies_);
     if (force_.hook) {
       const Scalar power = force_.hookPower(bodies_);
       left_.work -= (hookPower_ + power) * h / Scalar(2);
@@ -113,7 +113,8 @@ bool Space<Scalar, Layout>::placesChanged() const {
   }
   for (std::size_t i = 0; i < n(); ++i) {
     const auto body = bodies_[i];
-    if (!(places_[i].template head<3>() == body.position().array()).all() || !(places_[i][3] == body.mass())) {
+    if (!(places_[i].template head<3>() == body.position().array()).all() ||
+        !(places_[i][3] == body.mass())) {
       return true;
     }
   }
@@ -179,8 +180,8 @@ Material<Scalar> Space<Scalar, Layout>::pairMaterial(const CollisionContext& ctx
 }
 
 template <Real Scalar, class Layout>
-std::tuple<Vector3<Scalar>, Scalar, Scalar> Space<Scalar, Layout>::applyRestitutionImpulse(
-    CollisionContext& ctx) {
+auto Space<Scalar, Layout>::applyRestitutionImpulse(CollisionContext& ctx)
+    -> std::tuple<Vector, Scalar, Scalar> {
   const NormalImpulse<Scalar> blow =
       applyNormalImpulse<Scalar, Layout>(ctx, pairMaterial(ctx).restitution,
                                          std::max(this->config_.restitutionThreshold, this->config_.epsilon));
@@ -188,8 +189,8 @@ std::tuple<Vector3<Scalar>, Scalar, Scalar> Space<Scalar, Layout>::applyRestitut
 }
 
 template <Real Scalar, class Layout>
-Vector3<Scalar> Space<Scalar, Layout>::applyFrictionImpulse(const CollisionContext& ctx, Scalar jn,
-                                                            const Vector& /*impulseN*/) {
+auto Space<Scalar, Layout>::applyFrictionImpulse(const CollisionContext& ctx, Scalar jn,
+                                                 const Vector& /*impulseN*/) -> Vector {
   const Material<Scalar> m = pairMaterial(ctx);
   return gravel::applyFrictionImpulse<Scalar, Layout>(ctx, jn, m.staticFriction, m.kineticFriction,
                                                       m.tangentialRestitution);

@@ -1,0 +1,276 @@
+#pragma once
+
+/// \file
+/// The collision part of a step: candidates, contacts, overlap, impulses.
+
+#include <gravel/contact/contact_solver.hpp>
+#include <gravel/contact/narrow_phase.hpp>
+#include <gravel/core/profiler.hpp>
+#include <gravel/dynamics/boundary.hpp>
+#include <gravel/output/snapshot.hpp>
+#include <gravel/space/force_stage.hpp>
+#include <gravel/space/simulation_config.hpp>
+#include <gravel/spatial/neighbour_list.hpp>
+
+namespace gravel {
+
+template <Real Scalar, class Layout>
+class ContactStage {
+ public:
+  using Bodies = gravel::Bodies<Scalar, Layout>;
+  using Config = SimulationConfig<Scalar>;
+
+  Domain<Scalar> domain;
+  std::vector<Plane<Scalar>> planes;
+
+  const std::vector<Contact<Scalar>>& contacts() const { return contacts_; }
+  const ContactReport<Scalar>& report() const { return report_; }
+  const std::vector<Pair>& candidates() const { return candidates_; }
+
+  MaterialId addMaterial(const Material<Scalar>& material) {
+    validate(material, "the new material");
+    materials_.push_back(material);
+    return MaterialId{static_cast<std::uint32_t>(materials_.size() - 1)};
+  }
+
+  void checkMaterial(MaterialId id) const {
+    checkMaterial(static_cast<std::uint32_t>(id), "the body or plane");
+  }
+
+  void checkMaterials(const Bodies& bodies) const {
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      if (bodies.materials()[i] >= materials_.size()) {
+        checkMaterial(bodies.materials()[i], "body " + std::to_string(bodies.ids()[i]));
+      }
+    }
+  }
+
+  /// The surfaces of two materials in contact, mixed.
+  Material<Scalar> pairMaterial(MaterialId a, MaterialId b, const Config& config) const {
+    const auto surface = [&](MaterialId id) {
+      return id == defaultMaterial ? defaultOf(config) : materials_[static_cast<std::size_t>(id)];
+    };
+    return mix(surface(a), surface(b));
+  }
+
+  /// Brings bodies that left a periodic box back in through the other side.
+  void wrap(Bodies& bodies, const Scalar& time) const {
+    if (domain.isOpen()) {
+      return;
+    }
+    parallelFor(bodies.size(), detail::bodyGrain, [&](std::size_t i) {
+      Vector3<Scalar> x = bodies[i].position();
+      Vector3<Scalar> v = bodies[i].velocity();
+      domain.wrap(x, v, time);
+      bodies[i].position() = x;
+      bodies[i].velocity() = v;
+    });
+  }
+
+  /// Finds all contacts at the present positions.
+  void detect(const Bodies& bodies, const Config& config, const Scalar& time, Profiler& profiler) {
+    contacts_.clear();
+    const char* reason = reasonToSkip(bodies);
+    if (reason != nullptr) {
+      candidates_.clear();
+      profiler.skip(Phase::NeighbourSearch, reason);
+      profiler.skip(Phase::NarrowPhase, reason);
+      return;
+    }
+    {
+      const Profiler::Scope scope(profiler, Phase::NeighbourSearch);
+      neighbours_.setKind(config.broadPhase);
+      candidates_ = neighbours_.update(bodies.positions(), bodies.radii(), bodies.ids(), bodies.revision(),
+                                       domain, time);
+    }
+    const Profiler::Scope scope(profiler, Phase::NarrowPhase);
+    materials_[0] = defaultOf(config);
+    walls_.clear();
+    for (const Plane<Scalar>& plane : planes) {
+      walls_.push_back({plane.normal, plane.offset, materials_[static_cast<std::size_t>(plane.material)]});
+    }
+    narrow_.find(candidates_, bodies, domain, materials_, walls_, {time, config.epsilon, Scalar(0)},
+                 contacts_);
+  }
+
+  /// Shrinks overlaps by moving bodies, and renews the geometry of the contacts, so that impulses act where
+  /// the bodies are.
+  void separate(Bodies& bodies, const Config& config, const Scalar& time, Profiler& profiler) {
+    moved_ = false;
+    if (contacts_.empty()) {
+      profiler.skip(Phase::Colouring, "no contacts");
+      profiler.skip(Phase::PositionalCorrection, "no contacts");
+      return;
+    }
+    {
+      const Profiler::Scope scope(profiler, Phase::Colouring);
+      solver_.begin(contacts_, bodies);
+    }
+    if (config.positionalCorrectionFactor == Scalar(0)) {
+      profiler.skip(Phase::PositionalCorrection, "positionalCorrectionFactor is 0");
+      return;
+    }
+    const Profiler::Scope scope(profiler, Phase::PositionalCorrection);
+    CorrectionSettings<Scalar> settings;
+    settings.factor = config.positionalCorrectionFactor;
+    solver_.correctPositions(bodies, settings);
+    moved_ = !solver_.displacements().empty();
+    if (moved_) {
+      renewGeometry(bodies, config, time);
+    }
+  }
+
+  /// Energy that moving bodies apart took, F.d by the forces at the new places [J]: exact to the square of
+  /// the displacement d.
+  Scalar separationWork(const ForceStage<Scalar, Layout>& force, const Bodies& bodies) const {
+    Scalar work(0);
+    if (moved_) {
+      for (const Displacement<Scalar>& d : solver_.displacements()) {
+        work += force.conservativeForce(bodies, d.body).dot(d.shift);
+      }
+    }
+    return work;
+  }
+
+  /// Solves all contacts together on the present velocities.
+  /// \param h [s] the step that these contacts stand for
+  void solve(Bodies& bodies, const Config& config, const Scalar& h, Profiler& profiler) {
+    report_ = {};
+    if (contacts_.empty()) {
+      profiler.skip(Phase::ContactSolve, "no contacts");
+      solver_.forget();
+      return;
+    }
+    const Profiler::Scope scope(profiler, Phase::ContactSolve);
+    ContactSettings<Scalar> settings = solver_.settings();
+    settings.restitutionThreshold = std::max(config.restitutionThreshold, config.epsilon);
+    settings.tolerance = config.contactTolerance;
+    settings.maxIterations = static_cast<int>(config.contactIterations);
+    solver_.setSettings(settings);
+    report_ = solver_.solve(bodies, h);
+  }
+
+  /// Impulses of the last step [N s], in the order of contacts().
+  std::span<const ContactImpulse<Scalar>> impulses() const {
+    return contacts_.empty() ? std::span<const ContactImpulse<Scalar>>() : solver_.impulses();
+  }
+
+  void save(SnapshotWriter& out) const {
+    out.value("domain", static_cast<std::uint32_t>(domain.kind()));
+    out.array("domain lengths", domain.lengths().data(), 3);
+    std::vector<Scalar> numbers;
+    std::vector<std::uint32_t> surfaces;
+    for (const Plane<Scalar>& plane : planes) {
+      numbers.insert(numbers.end(), {plane.normal[0], plane.normal[1], plane.normal[2], plane.offset});
+      surfaces.push_back(static_cast<std::uint32_t>(plane.material));
+    }
+    out.array("planes", numbers.data(), numbers.size());
+    out.array("materials of planes", surfaces.data(), surfaces.size());
+    out.array("materials", materials_.data(), materials_.size());
+    std::vector<std::uint64_t> keys;
+    numbers.clear();
+    for (const StoredImpulse<Scalar>& stored : solver_.memory()) {
+      const ContactImpulse<Scalar>& j = stored.impulse;
+      keys.insert(keys.end(), {stored.key1, stored.key2});
+      numbers.insert(numbers.end(), {j.normal, j.tangential[0], j.tangential[1], j.tangential[2]});
+    }
+    out.array("keys of impulses", keys.data(), keys.size());
+    out.array("impulses", numbers.data(), numbers.size());
+    out.value("step of impulses", solver_.memoryStep());
+  }
+
+  /// \throws std::runtime_error, std::invalid_argument if the file does not hold what save() writes
+  void load(SnapshotReader& in) {
+    const auto kind = in.value<std::uint32_t>("domain");
+    const std::vector<Scalar> lengths = in.array<Scalar>("domain lengths");
+    if (lengths.size() != 3 || kind > static_cast<std::uint32_t>(DomainKind::Periodic)) {
+      in.fail("holds a domain that is neither open nor periodic");
+    }
+    if (static_cast<DomainKind>(kind) == DomainKind::Periodic) {
+      domain = Domain<Scalar>::periodic({lengths[0], lengths[1], lengths[2]});
+    }
+    const std::vector<Scalar> sides = in.array<Scalar>("planes");
+    const auto surfaces = in.array<std::uint32_t>("materials of planes");
+    materials_ = in.array<Material<Scalar>>("materials");
+    const auto keys = in.array<std::uint64_t>("keys of impulses");
+    const std::vector<Scalar> impulses = in.array<Scalar>("impulses");
+    if (sides.size() != 4 * surfaces.size() || impulses.size() != 2 * keys.size() || materials_.empty()) {
+      in.fail("holds lists of different lengths");
+    }
+    for (std::size_t p = 0; p < surfaces.size(); ++p) {
+      checkMaterial(surfaces[p], "plane " + std::to_string(p));
+      const Scalar* side = &sides[4 * p];
+      planes.push_back({{side[0], side[1], side[2]}, side[3], MaterialId{surfaces[p]}});
+    }
+    std::vector<StoredImpulse<Scalar>> memory(keys.size() / 2);
+    for (std::size_t k = 0; k < memory.size(); ++k) {
+      const Scalar* j = &impulses[4 * k];
+      memory[k] = {keys[2 * k], keys[2 * k + 1], {j[0], {j[1], j[2], j[3]}}};
+    }
+    solver_.setMemory(std::move(memory), in.value<Scalar>("step of impulses"));
+  }
+
+ private:
+  static Material<Scalar> defaultOf(const Config& c) {
+    return {.restitution = c.coeffRestitution,
+            .staticFriction = std::max(c.coeffStaticFriction, c.coeffFriction),
+            .kineticFriction = c.coeffFriction,
+            .tangentialRestitution = c.tangentialRestitution};
+  }
+
+  void checkMaterial(std::uint32_t id, const std::string& who) const {
+    if (id >= materials_.size()) {
+      detail::refuse(
+          "material of " + who, std::to_string(id),
+          "0 (the space's own) or a material of addMaterial, below " + std::to_string(materials_.size()));
+    }
+  }
+
+  void renewGeometry(const Bodies& bodies, const Config& config, const Scalar& time) {
+    parallelFor(contacts_.size(), 1024, [&](std::size_t k) {
+      Contact<Scalar>& c = contacts_[k];
+      const Vector3<Scalar> x1 = bodies.positions()[c.first];
+      const Scalar r1 = bodies.radii()[c.first];
+      if (c.second == staticPartner) {
+        const HalfSpace<Scalar>& wall = walls_[static_cast<std::size_t>(c.key2 - boundaryKey(0))];
+        c.gap = std::min<Scalar>(wall.normal.dot(x1) - wall.offset - r1, Scalar(0));
+        return;
+      }
+      Vector3<Scalar> r_12 = Vector3<Scalar>(bodies.positions()[c.second]) - x1;
+      r_12 = domain.minimumImage(r_12, time);
+      const Scalar r2 = bodies.radii()[c.second];
+      // A margin, since a pair that was moved apart is a contact of this step all the same.
+      const auto touch = sphereSphere<Scalar>(r_12, r1, r2, c.key1, c.key2, config.epsilon, r1 + r2);
+      if (touch) {
+        c.normal = touch->normal;
+        c.gap = std::min<Scalar>(touch->gap, Scalar(0));
+        c.arm1 = touch->arm1;
+        c.arm2 = touch->arm2;
+      }
+    });
+  }
+
+  const char* reasonToSkip(const Bodies& bodies) const {
+    if (bodies.size() < 2 && planes.empty()) {
+      return "one body and no boundary";
+    }
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      if (Scalar(bodies.radii()[i]) > Scalar(0)) {
+        return nullptr;
+      }
+    }
+    return "no body has a radius";
+  }
+
+  std::vector<Material<Scalar>> materials_ = std::vector<Material<Scalar>>(1);  // 0 is the space's own
+  std::vector<HalfSpace<Scalar>> walls_;
+  NeighbourList<Scalar> neighbours_;
+  NarrowPhase<Scalar> narrow_;
+  std::vector<Pair> candidates_;
+  std::vector<Contact<Scalar>> contacts_;
+  ContactSolver<Scalar> solver_;
+  ContactReport<Scalar> report_;
+  bool moved_ = false;
+};
+
+}  // namespace gravel
