@@ -416,3 +416,32 @@ TEMPLATE_LIST_TEST_CASE("bodies: reserve changes nothing that can be seen", "[bo
   CHECK(difference(c.bodies, tags) == "");
   CHECK(c.bodies.revision() == revision);
 }
+
+TEMPLATE_LIST_TEST_CASE("bodies: assign takes over the bodies of any layout with ids, fields and the next id",
+                        "[bodies]", AllCases) {
+  using S = typename TestType::Scalar;
+  TestType c;
+  for (int k = 0; k < 40; ++k) {
+    addCoded(c.bodies, 100 + k);
+  }
+  Bodies<S, AoSoA<4>> other;
+  std::map<std::uint64_t, int> tags;
+  for (int k = 0; k < 21; ++k) {
+    tags[toInteger(addCoded(other, k))] = k;
+  }
+  other.remove(BodyId{20});
+  other.remove(BodyId{3});
+  tags.erase(20);
+  tags.erase(3);
+  other.skipIds(BodyId{50});
+  const std::uint64_t revision = c.bodies.revision();
+  c.bodies.assign(other);
+  CHECK(difference(c.bodies, tags) == "");
+  CHECK(c.bodies.revision() > revision);
+  for (std::size_t i = 0; i < other.size(); ++i) {
+    CHECK(c.bodies[i].id() == other[i].id());
+  }
+  c.bodies.assign(c.bodies);
+  CHECK(difference(c.bodies, tags) == "");
+  CHECK(c.bodies.add(sampleBody<S>()) == BodyId{50});
+}

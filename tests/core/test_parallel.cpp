@@ -1,0 +1,247 @@
+#include "support/catch.hpp"
+#include <gravel/core/parallel.hpp>
+#include <gravel/core/types.hpp>
+
+#include <omp.h>
+
+#include <atomic>
+#include <chrono>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+using namespace gravel;
+
+namespace {
+
+/// The number of threads for one scope.
+class Threads {
+ public:
+  explicit Threads(int n) : before_(omp_get_max_threads()) { omp_set_num_threads(n); }
+  ~Threads() { omp_set_num_threads(before_); }
+  Threads(const Threads&) = delete;
+  Threads& operator=(const Threads&) = delete;
+
+ private:
+  int before_;
+};
+
+constexpr std::size_t largest = std::numeric_limits<std::size_t>::max();
+
+/// A sum whose last bits tell in which order it was added.
+double harmonic(std::size_t begin, std::size_t end) {
+  double sum = 0.0;
+  for (std::size_t i = begin; i < end; ++i) {
+    sum += 1.0 / static_cast<double>(3 * i + 1);
+  }
+  return sum;
+}
+
+template <class Call>
+std::string messageOf(Call&& call) {
+  try {
+    call();
+  } catch (const std::exception& e) {
+    return e.what();
+  }
+  return "(nothing was thrown)";
+}
+
+void waitMilliseconds(int ms) { std::this_thread::sleep_for(std::chrono::milliseconds(ms)); }
+
+}  // namespace
+
+TEST_CASE("parallel: chunks cover every index once, in pieces of the length asked for", "[parallel]") {
+  for (const int threads : {1, 2, 3, 8}) {
+    const Threads scope(threads);
+    for (const std::size_t n : {0U, 1U, 2U, 7U, 64U, 1000U}) {
+      for (const std::size_t chunk : {std::size_t{0}, std::size_t{1}, std::size_t{7}, std::size_t{64}, n,
+                                      n + 1, largest - 1, largest}) {
+        INFO("threads " << threads << ", n " << n << ", chunk " << chunk);
+        std::vector<std::atomic<int>> seen(n);
+        std::atomic<bool> wellFormed{true};
+        parallelForChunks(n, chunk, [&](std::size_t begin, std::size_t end) {
+          const std::size_t length = chunk == 0 ? 1 : chunk;
+          if (begin >= end || end > n || begin % length != 0 || (end != n && end - begin != length)) {
+            wellFormed = false;
+          }
+          for (std::size_t i = begin; i < std::min(end, n); ++i) {
+            ++seen[i];
+          }
+        });
+        CHECK(wellFormed);
+        CHECK(std::all_of(seen.begin(), seen.end(), [](const auto& times) { return times == 1; }));
+      }
+    }
+  }
+}
+
+TEST_CASE("parallel: parallelFor calls each index once", "[parallel]") {
+  for (const int threads : {1, 2, 3, 8}) {
+    const Threads scope(threads);
+    std::vector<int> seen(1003, 0);
+    parallelFor(seen.size(), 10, [&](std::size_t i) { ++seen[i]; });
+    CHECK(std::all_of(seen.begin(), seen.end(), [](int times) { return times == 1; }));
+  }
+}
+
+// An OpenMP reduction, or partial sums by thread, differ in the last bits here between 2 and 3 threads.
+TEST_CASE("parallel: ordered sums have the same bits for any number of threads", "[parallel]") {
+  for (const std::size_t n : {1U, 2U, 3U, 17U, 1000U, 100001U}) {
+    for (const std::size_t chunk : {1U, 3U, 64U, 1000U}) {
+      double expected = 0.0;
+      {
+        const Threads scope(1);
+        expected = orderedSum(n, chunk, 0.0, harmonic);
+      }
+      for (const int threads : {2, 3, 8}) {
+        const Threads scope(threads);
+        for (int repeat = 0; repeat < 3; ++repeat) {
+          INFO("threads " << threads << ", n " << n << ", chunk " << chunk);
+          CHECK(orderedSum(n, chunk, 0.0, harmonic) == expected);
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("parallel: ordered sums add the chunks pairwise in their order", "[parallel]") {
+  const auto part = [](std::size_t c) { return harmonic(10 * c, 10 * c + 10); };
+  const double expected = ((part(0) + part(1)) + (part(2) + part(3))) + part(4);
+  CHECK(orderedSum(std::size_t{50}, 10, 0.0, harmonic) == expected);
+}
+
+// Ten million equal terms. Pairwise: at most log2(n) = 24 roundings of half an epsilon each (Higham 1993);
+// one after the other the float's sum stops at 2^24 * 0.1.
+TEST_CASE("parallel: the rounding error of an ordered sum grows with the logarithm of the number of chunks",
+          "[parallel]") {
+  const std::size_t n = 1U << 23U;
+  const float sum = orderedSum(n, 1, 0.0F, [](std::size_t, std::size_t) { return 0.1F; });
+  const double exact = static_cast<double>(0.1F) * static_cast<double>(n);
+  CHECK(std::abs(static_cast<double>(sum) - exact) <= 24 * 0.5 * 1.2e-7 * exact);
+}
+
+TEST_CASE("parallel: ordered sums of vectors, of one chunk and of none", "[parallel]") {
+  const Vector3<double> zero = Vector3<double>::Zero();
+  const auto ramp = [](std::size_t begin, std::size_t end) {
+    Vector3<double> sum = Vector3<double>::Zero();
+    for (std::size_t i = begin; i < end; ++i) {
+      sum += Vector3<double>(1.0, static_cast<double>(i), -2.0);
+    }
+    return sum;
+  };
+  CHECK(orderedSum(std::size_t{100}, 7, zero, ramp) == Vector3<double>(100.0, 4950.0, -200.0));
+  CHECK(orderedSum(std::size_t{100}, largest, zero, ramp) == Vector3<double>(100.0, 4950.0, -200.0));
+  int calls = 0;
+  const double none = orderedSum(std::size_t{0}, 7, -0.0, [&](std::size_t, std::size_t) {
+    ++calls;
+    return 1.0;
+  });
+  CHECK(std::signbit(none));
+  CHECK(calls == 0);
+}
+
+TEST_CASE("parallel: with two threads two chunks run at the same time", "[parallel]") {
+  const Threads scope(2);
+  std::atomic<int> started{0};
+  std::atomic<int> met{0};
+  parallelForTasks(2, [&](std::size_t) {
+    ++started;
+    for (int ms = 0; ms < 20000 && started < 2; ++ms) {
+      waitMilliseconds(1);
+    }
+    met += started == 2 ? 1 : 0;
+  });
+  CHECK(met == 2);
+}
+
+TEST_CASE("parallel: one chunk runs on the calling thread and opens no region", "[parallel]") {
+  const Threads scope(8);
+  const auto caller = std::this_thread::get_id();
+  int calls = 0;
+  parallelForChunks(5, 5, [&](std::size_t begin, std::size_t end) {
+    ++calls;
+    CHECK(begin == 0);
+    CHECK(end == 5);
+    CHECK(std::this_thread::get_id() == caller);
+    CHECK(omp_in_parallel() == 0);
+  });
+  CHECK(calls == 1);
+}
+
+// Keeping the exception that comes first in time fails here: chunk 3 waits before it throws.
+TEST_CASE("parallel: the exception of the lowest chunk comes out, for any number of threads", "[parallel]") {
+  for (const int threads : {1, 2, 3, 8}) {
+    const Threads scope(threads);
+    for (int repeat = 0; repeat < 20; ++repeat) {
+      std::atomic<int> before{0};
+      const auto task = [&](std::size_t c) {
+        if (c < 3) {
+          ++before;
+        }
+        if (c == 3) {
+          waitMilliseconds(2);
+        }
+        if (c == 3 || c == 5 || c == 11) {
+          throw std::runtime_error("chunk " + std::to_string(c));
+        }
+      };
+      INFO("threads " << threads);
+      CHECK(messageOf([&] { parallelForTasks(12, task); }) == "chunk 3");
+      CHECK(before == 3);
+      CHECK(messageOf([&] { parallelFor(12, 1, task); }) == "chunk 3");
+      CHECK(messageOf([&] {
+              orderedSum(std::size_t{12}, 1, 0.0, [&](std::size_t begin, std::size_t) {
+                task(begin);
+                return 1.0;
+              });
+            }) == "chunk 3");
+    }
+  }
+}
+
+TEST_CASE("parallel: exceptions of any type come out of the region", "[parallel]") {
+  for (const int threads : {1, 2, 8}) {
+    const Threads scope(threads);
+    int caught = 0;
+    try {
+      parallelForTasks(4, [](std::size_t c) {
+        if (c == 2) {
+          throw 42;
+        }
+      });
+    } catch (int value) {
+      caught = value;
+    }
+    CHECK(caught == 42);
+    CHECK(omp_in_parallel() == 0);
+  }
+}
+
+TEST_CASE("parallel: nested calls run on one thread and give the same results", "[parallel]") {
+  for (const int threads : {1, 2, 3, 8}) {
+    const Threads scope(threads);
+    CHECK(threadCount() == threads);
+    std::vector<double> sums(6, 0.0);
+    std::atomic<bool> oneInside{true};
+    parallelForTasks(sums.size(), [&](std::size_t c) {
+      if (threadCount() != 1 && omp_in_parallel() != 0) {
+        oneInside = false;
+      }
+      sums[c] = orderedSum(1000 + c, 10, 0.0, harmonic);
+    });
+    CHECK(oneInside);
+    for (std::size_t c = 0; c < sums.size(); ++c) {
+      CHECK(sums[c] == orderedSum(1000 + c, 10, 0.0, harmonic));
+    }
+    CHECK(messageOf([] {
+            parallelForTasks(4, [](std::size_t outer) {
+              parallelForTasks(4, [&](std::size_t inner) {
+                if (outer >= 1 && inner >= 2) {
+                  throw std::runtime_error(std::to_string(outer) + std::to_string(inner));
+                }
+              });
+            });
+          }) == "12");
+  }
+}
