@@ -104,7 +104,9 @@ class DirectSum {
 
   /// Bodies a block: small enough that two blocks stay in the nearest cache and there is work for many
   /// threads, large enough that the reductions of a source do not count.
-  static constexpr std::size_t blockSize(std::size_t n) { return n < 1024 ? 64 : n < 8192 ? 128 : 256; }
+  static constexpr std::size_t blockSize(std::size_t n) {
+    return n < 1024 ? 64 : n < 8192 ? 128 : detail::PairTable<S>::maxBlock;
+  }
 
   /// Below this many pairs a parallel region costs more than it brings.
   static constexpr std::size_t pairsWorthThreads = 50000;

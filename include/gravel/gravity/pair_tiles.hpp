@@ -6,6 +6,8 @@
 
 #include <gravel/gravity/pair_law.hpp>
 
+#include <algorithm>
+#include <array>
 #include <vector>
 
 namespace gravel::detail {
@@ -15,7 +17,7 @@ namespace gravel::detail {
 template <Real S>
 struct GravityTile {
   static constexpr int width = 1;
-  static constexpr int sources = 1;  ///< broadcast together, to load and store a tile less often
+  static constexpr std::size_t sources = 1;  ///< broadcast together, to load and store a tile less often
   using Type = S;
 
   static S load(const S* p) { return *p; }
@@ -28,7 +30,7 @@ template <Real S>
   requires(std::is_same_v<S, float> || std::is_same_v<S, double>)
 struct GravityTile<S> {
   static constexpr int width = laneWidth<S>;
-  static constexpr int sources = std::is_same_v<S, float> ? 2 : 4;
+  static constexpr std::size_t sources = std::is_same_v<S, float> ? 2 : 4;
   using Type = Lanes<S, width>;
 
   static Type load(const S* p) { return Eigen::Map<const Type>(p); }
@@ -64,11 +66,26 @@ struct PairTable {
     }
   }
 
-  /// Every pair of two disjoint ranges of rows, both ways. Ranges are whole tiles.
+  /// Rows that one call of addMutual or addWithin may take.
+  static constexpr std::size_t maxBlock = 256;
+
+  /// Every pair of two disjoint ranges of rows, both ways. Ranges are whole tiles, the first at most
+  /// maxBlock. The first range's sums are gathered apart and added at the end: rounding then grows with the
+  /// root of the number of blocks instead of bodies.
   void addMutual(std::size_t firstBegin, std::size_t firstEnd, std::size_t secondBegin,
                  std::size_t secondEnd) {
+    alignas(64) std::array<S, maxBlock> sx, sy, sz;
+    const std::size_t n = firstEnd - firstBegin;
+    for (std::array<S, maxBlock>* sum : {&sx, &sy, &sz}) {
+      std::fill(sum->begin(), sum->begin() + static_cast<std::ptrdiff_t>(n), S(0));
+    }
     for (std::size_t j = secondBegin; j < secondEnd; j += Tile::sources) {
-      addMutual(firstBegin, firstEnd, j);
+      addSources(firstBegin, n, j, sx.data(), sy.data(), sz.data());
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      ax[firstBegin + i] += sx[i];
+      ay[firstBegin + i] += sy[i];
+      az[firstBegin + i] += sz[i];
     }
   }
 
@@ -79,12 +96,15 @@ struct PairTable {
       for (std::size_t j = tile; j < tile + width; ++j) {
         addOneWay(tile, tile + width, j);
       }
-      addMutual(tile + width, end, tile, tile + width);
+      const std::size_t rest = tile + width;
+      for (std::size_t j = tile; j < rest; j += Tile::sources) {
+        addSources(rest, end - rest, j, ax.data() + rest, ay.data() + rest, az.data() + rest);
+      }
     }
   }
 
   /// What the source j does to a range.
-  void addOneWay(std::size_t begin, std::size_t end, std::size_t j) {
+  [[gnu::flatten]] void addOneWay(std::size_t begin, std::size_t end, std::size_t j) {
     const T xj = Tile::constant(x[j]);
     const T yj = Tile::constant(y[j]);
     const T zj = Tile::constant(z[j]);
@@ -101,8 +121,8 @@ struct PairTable {
   }
 
   /// Sum of m_i m_j p_ij over the pairs of two disjoint ranges.
-  S potentialBetween(std::size_t firstBegin, std::size_t firstEnd, std::size_t secondBegin,
-                     std::size_t secondEnd) const {
+  [[gnu::flatten]] S potentialBetween(std::size_t firstBegin, std::size_t firstEnd, std::size_t secondBegin,
+                                      std::size_t secondEnd) const {
     S total(0);
     for (std::size_t j = secondBegin; j < secondEnd; ++j) {
       T sum = Tile::constant(S(0));
@@ -134,28 +154,29 @@ struct PairTable {
   }
 
  private:
-  /// The sources j … j + Tile::sources - 1 against a range.
-  void addMutual(std::size_t begin, std::size_t end, std::size_t j) {
-    constexpr int n = Tile::sources;
+  /// The sources j … j + Tile::sources - 1 against `count` rows from `begin`, whose sums stand at sx, sy, sz.
+  /// Flattened, as g++ -O2 would call a function for each small step.
+  [[gnu::flatten]] void addSources(std::size_t begin, std::size_t count, std::size_t j, S* sx, S* sy, S* sz) {
+    constexpr std::size_t n = Tile::sources;
     T xj[n], yj[n], zj[n], mj[n];
     T rx[n], ry[n], rz[n];  // reactions, to be reduced once
-    for (int k = 0; k < n; ++k) {
-      const std::size_t source = j + static_cast<std::size_t>(k);
+    for (std::size_t k = 0; k < n; ++k) {
+      const std::size_t source = j + k;
       xj[k] = Tile::constant(x[source]);
       yj[k] = Tile::constant(y[source]);
       zj[k] = Tile::constant(z[source]);
       mj[k] = Tile::constant(m[source]);
       rx[k] = ry[k] = rz[k] = Tile::constant(S(0));
     }
-    for (std::size_t i = begin; i < end; i += width) {
-      const T xi = Tile::load(&x[i]);
-      const T yi = Tile::load(&y[i]);
-      const T zi = Tile::load(&z[i]);
-      const T mi = Tile::load(&m[i]);
-      T axi = Tile::load(&ax[i]);
-      T ayi = Tile::load(&ay[i]);
-      T azi = Tile::load(&az[i]);
-      for (int k = 0; k < n; ++k) {
+    for (std::size_t i = 0; i < count; i += width) {
+      const T xi = Tile::load(&x[begin + i]);
+      const T yi = Tile::load(&y[begin + i]);
+      const T zi = Tile::load(&z[begin + i]);
+      const T mi = Tile::load(&m[begin + i]);
+      T axi = Tile::load(sx + i);
+      T ayi = Tile::load(sy + i);
+      T azi = Tile::load(sz + i);
+      for (std::size_t k = 0; k < n; ++k) {
         const T dx = xj[k] - xi;
         const T dy = yj[k] - yi;
         const T dz = zj[k] - zi;
@@ -170,12 +191,12 @@ struct PairTable {
         ry[k] -= f_j * dy;
         rz[k] -= f_j * dz;
       }
-      Tile::store(&ax[i], axi);
-      Tile::store(&ay[i], ayi);
-      Tile::store(&az[i], azi);
+      Tile::store(sx + i, axi);
+      Tile::store(sy + i, ayi);
+      Tile::store(sz + i, azi);
     }
-    for (int k = 0; k < n; ++k) {
-      const std::size_t source = j + static_cast<std::size_t>(k);
+    for (std::size_t k = 0; k < n; ++k) {
+      const std::size_t source = j + k;
       ax[source] += Tile::sum(rx[k]);
       ay[source] += Tile::sum(ry[k]);
       az[source] += Tile::sum(rz[k]);
