@@ -65,8 +65,11 @@ class SnapshotWriter {
 
  private:
   void raw(const void* data, std::size_t n) {
-    const auto* first = static_cast<const unsigned char*>(data);
-    bytes_.insert(bytes_.end(), first, first + n);
+    const std::size_t at = bytes_.size();
+    bytes_.resize(at + n);  // g++ 12 sees an overflow in insert() where there is none
+    if (n > 0) {
+      std::memcpy(bytes_.data() + at, data, n);
+    }
   }
 
   std::vector<unsigned char> bytes_;
