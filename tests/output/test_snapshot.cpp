@@ -1,0 +1,196 @@
+#include "support/catch.hpp"
+#include <gravel/core/random.hpp>
+#include <gravel/output/snapshot.hpp>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+
+using namespace gravel;
+using namespace gravel::test;
+
+namespace {
+
+/// A file of its own that goes when the test ends.
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(const std::string& name)
+      : path_((std::filesystem::temp_directory_path() /
+               ("gravel_test_" + name + "_" + std::to_string(reinterpret_cast<std::uintptr_t>(this))))
+                  .string()) {}
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+  ~TemporaryFile() { std::filesystem::remove(path_); }
+  const std::string& path() const { return path_; }
+
+  std::vector<char> bytes() const {
+    std::ifstream in(path_, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  }
+  void put(const std::vector<char>& bytes) const {
+    std::ofstream out(path_, std::ios::binary | std::ios::trunc);
+    out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  }
+
+ private:
+  std::string path_;
+};
+
+template <class S, class Layout>
+Bodies<S, Layout> some() {
+  Bodies<S, Layout> bodies;
+  const CounterRandom random(4);
+  for (std::uint64_t i = 0; i < 23; ++i) {
+    Body<S> body;
+    body.position = random.direction(20 * i).template cast<S>() / S(3);
+    body.velocity = random.direction(20 * i + 1).template cast<S>() / S(7);
+    body.angularVelocity = random.direction(20 * i + 2).template cast<S>() / S(11);
+    body.mass = S(random.uniform(20 * i + 19, 1, 2));
+    body.radius = S(0.1);
+    body.fixed = i % 5 == 0;
+    body.material = MaterialId{static_cast<std::uint32_t>(i % 3)};
+    if (i % 2 == 0) {
+      body.inertia = S(0.123) / S(i + 1);
+    }
+    bodies.add(body, BodyId{100 + 3 * i});
+    bodies[i].force() = Vector3<S>(S(1) / S(3), S(i), S(-2));
+    bodies[i].angularAcceleration() = Vector3<S>(S(i) / S(9), S(0), S(1e-30L));
+  }
+  return bodies;
+}
+
+template <class A, class B>
+bool sameBits(const A& a, const B& b) {
+  bool same = a.size() == b.size();
+  for (std::size_t i = 0; same && i < a.size(); ++i) {
+    forEachField([&]<class F>(F field) {
+      if constexpr (RealField<F>) {
+        if constexpr (F::width == 1) {
+          same = same && a.storage().at(field, i) == b.storage().at(field, i);
+        } else if constexpr (F::width == 4) {
+          same = same && a.storage().at(field, i).coeffs() == b.storage().at(field, i).coeffs();
+        } else {
+          same = same && a.storage().at(field, i) == b.storage().at(field, i);
+        }
+      } else {
+        same = same && a.storage().at(field, i) == b.storage().at(field, i);
+      }
+    });
+  }
+  return same;
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("Bodies come back from a file with every bit of every field", "", (std::pair<float, SoA>),
+                   (std::pair<double, AoS>), (std::pair<long double, AoSoA<8>>)) {
+  using S = typename TestType::first_type;
+  const auto bodies = some<S, typename TestType::second_type>();
+  const TemporaryFile file("bodies");
+  SnapshotWriter out;
+  saveBodies(bodies, out);
+  out.write(file.path());
+  SnapshotReader in(file.path());
+  const Bodies<S, SoA> back = loadBodies<S>(in);
+  CHECK(sameBits(bodies, back));
+  CHECK(back[7].id() == BodyId{121});
+  CHECK(back.nextId() == bodies.nextId());
+  CHECK(back.indexOf(BodyId{121}) == 7);
+}
+
+TEST_CASE("Values and arrays come back in order, and only in order") {
+  const TemporaryFile file("order");
+  SnapshotWriter out;
+  const double numbers[3] = {0.1, -0.0, std::numeric_limits<double>::denorm_min()};
+  out.array("numbers", numbers, 3);
+  out.value("flag", std::uint8_t{1});
+  out.write(file.path());
+  {
+    SnapshotReader in(file.path());
+    const std::vector<double> back = in.array<double>("numbers");
+    REQUIRE(back.size() == 3);
+    CHECK(std::memcmp(back.data(), numbers, sizeof numbers) == 0);
+    CHECK(in.value<std::uint8_t>("flag") == 1);
+    CHECK_THROWS_WITH(in.value<double>("more"), ContainsSubstring("ends before 'more'"));
+  }
+  SnapshotReader in(file.path());
+  CHECK_THROWS_WITH(in.value<std::uint8_t>("flag"),
+                    ContainsSubstring("'numbers'") && ContainsSubstring("'flag'"));
+}
+
+TEST_CASE("A file of another scalar is refused with both sizes") {
+  const TemporaryFile file("scalar");
+  SnapshotWriter out;
+  saveBodies(some<double, SoA>(), out);
+  out.write(file.path());
+  SnapshotReader in(file.path());
+  CHECK_THROWS_WITH(loadBodies<float>(in),
+                    ContainsSubstring("another Scalar") && ContainsSubstring("8 bytes"));
+}
+
+// Each position of the file in turn is damaged, or the file ends there: all are refused, none crashes.
+// Seen to fail: the comparison of the checksum left out.
+TEST_CASE("Every damaged bit and every missing end of a file is found") {
+  const TemporaryFile file("damage");
+  SnapshotWriter out;
+  saveBodies(Bodies<double>(), out);
+  out.write(file.path());
+  const std::vector<char> whole = file.bytes();
+  REQUIRE(whole.size() > 100);
+  {
+    SnapshotReader in(file.path());
+    CHECK(loadBodies<double>(in).empty());
+  }
+  for (std::size_t at = 0; at < whole.size(); ++at) {
+    std::vector<char> bytes = whole;
+    bytes[at] = static_cast<char>(bytes[at] ^ 0x10);
+    file.put(bytes);
+    CHECK_THROWS_AS(SnapshotReader(file.path()), std::runtime_error);
+    bytes = whole;
+    bytes.resize(at);
+    file.put(bytes);
+    CHECK_THROWS_AS(SnapshotReader(file.path()), std::runtime_error);
+  }
+}
+
+TEST_CASE("A record that claims to be longer than the file is refused, without memory being asked for") {
+  // A well-formed file whose checksum fits, with a length field of 2^61 doubles.
+  std::vector<unsigned char> bytes(detail::snapshotMagic,
+                                   detail::snapshotMagic + sizeof detail::snapshotMagic - 1);
+  const std::uint64_t head[3] = {1, sizeof(double), std::uint64_t{1} << 61U};
+  const auto* first = reinterpret_cast<const unsigned char*>(head);
+  bytes.insert(bytes.end(), first, first + sizeof head);
+  bytes.push_back('x');
+  const std::uint64_t sum = detail::fnv1a(detail::fnvStart, bytes.data(), bytes.size());
+  const auto* tail = reinterpret_cast<const unsigned char*>(&sum);
+  bytes.insert(bytes.end(), tail, tail + sizeof sum);
+  const TemporaryFile file("long");
+  file.put(std::vector<char>(bytes.begin(), bytes.end()));
+  SnapshotReader in(file.path());
+  CHECK_THROWS_AS(in.array<double>("x"), std::runtime_error);
+}
+
+TEST_CASE("What is no snapshot, or not there, or cannot be written, is told by its path") {
+  const TemporaryFile file("text");
+  file.put({'h', 'e', 'l', 'l', 'o', ' ', 'w', 'o', 'r', 'l', 'd', '!', '!', '!',
+            '!', '!', '!', '!', '!', '!', '!', '!', '!', '!', '!', '!', '!', '!'});
+  CHECK_THROWS_WITH(SnapshotReader(file.path()),
+                    ContainsSubstring(file.path()) && ContainsSubstring("not a snapshot"));
+  CHECK_THROWS_WITH(SnapshotReader("/nowhere/at/all"), ContainsSubstring("/nowhere/at/all"));
+  SnapshotWriter out;
+  CHECK_THROWS_WITH(out.write("/nowhere/at/all"), ContainsSubstring("/nowhere/at/all"));
+}
+
+TEST_CASE("A failed write leaves the file before it as it was, and no part behind") {
+  const TemporaryFile file("kept");
+  file.put({'o', 'l', 'd'});
+  // The part file cannot be made where a folder of that name stands.
+  std::filesystem::create_directory(file.path() + ".part");
+  SnapshotWriter out;
+  out.value("x", 1.0);
+  CHECK_THROWS_AS(out.write(file.path()), std::runtime_error);
+  CHECK(file.bytes() == std::vector<char>{'o', 'l', 'd'});
+  std::filesystem::remove(file.path() + ".part");
+}
