@@ -23,7 +23,7 @@ struct ContactSettings {
   Scalar tolerance = Scalar(1e-6);
   int maxIterations = 100;  ///< >= 1: sweeps at most
   bool warmStart = true;    ///< begin from the impulses of the last step
-  bool accelerate = true;   ///< conjugate steps between sweeps; off: plain Gauss-Seidel
+  bool accelerate = true;   ///< momentum between sweeps; off: plain Gauss-Seidel
 };
 
 /// What a solve did.

@@ -10,8 +10,13 @@
 
 namespace gravel {
 
-/// Solver of a ContactProblem. Shares the contacts of a large colour between threads; the same bits for any
-/// number of threads. O(contacts) a sweep.
+/// Solver of a ContactProblem. Between sweeps the impulses go on along their last step (Nesterov's momentum,
+/// started anew when a sweep turns back: O'Donoghue & Candes 2015, Found. Comput. Math. 15, 715; for contacts
+/// Mazhar et al. 2015, ACM Trans. Graph. 34, 32). Without friction the problem is a convex quadratic one and
+/// the number of sweeps falls to about its square root. With friction, whose cone follows the normal impulse,
+/// full momentum does not settle, so it is held at 0.8. Sweeps always have the last word: results obey the
+/// cone. Shares the contacts of a large colour between threads; the same bits for any number of threads.
+/// O(contacts) a sweep.
 template <Real S>
 class SequentialImpulses {
  public:
@@ -21,6 +26,7 @@ class SequentialImpulses {
   /// \return iterations and residual; the caller adds the rest
   ContactReport<S> solve(ContactProblem<S>& problem, const ContactColoring& colouring,
                          const ContactSettings<S>& settings) {
+    using std::sqrt;
     ContactReport<S> report;
     eachOf(0, colouring.loneCount(), [&](std::size_t k) { return strike(problem, problem.rows[k]); });
     if (colouring.loneCount() == problem.rows.size()) {
@@ -28,10 +34,11 @@ class SequentialImpulses {
       return report;
     }
     everyColour(colouring, [&](std::size_t k) { return applyGuess(problem, problem.rows[k]); });
-    const S enough = settings.tolerance * problem.largestApproach;
+    const S rounding = S(8) * Eigen::NumTraits<S>::epsilon();
+    const S enough = std::max<S>(settings.tolerance, rounding) * problem.largestApproach;
     const bool friction = problem.friction;
-    Progress last;
     S beta(0);
+    int age = 0;
     begin(problem);
     while (true) {
       const Progress now = everyColour(colouring, [&](std::size_t k) {
@@ -40,15 +47,16 @@ class SequentialImpulses {
                         : relax<false>(problem, row, steps_[k], beta);
       });
       ++report.iterations;
-      report.residual = now.change / problem.largestApproach;
-      if (!(now.change > enough) || report.iterations >= settings.maxIterations) {
+      const S change = sqrt(now.change_sq);
+      report.residual = change / problem.largestApproach;
+      if (!(change > enough) || report.iterations >= settings.maxIterations) {
         return report;
       }
-      // Fletcher & Reeves; a step that did not shrink the change starts anew.
-      beta = settings.accelerate && now.size < last.size ? now.size / last.size : S(0);
-      last = now;
       if (settings.accelerate) {
-        coast(problem, beta);
+        const S old = beta;
+        age = now.along < S(0) ? 0 : age + 1;
+        beta = std::min<S>(S(age) / S(age + 3), S(friction ? 0.8 : 1.0));
+        coast(problem, old, beta);
       }
     }
   }
@@ -59,29 +67,28 @@ class SequentialImpulses {
   static constexpr std::size_t chunk = 512;
   static constexpr std::uint32_t patience = 8;
 
-  /// What a sweep did: largest change of a velocity, and the sum of the squares of the impulses over mass.
+  /// What a sweep did: largest change of a velocity, squared, and the product, over mass, of the changes of
+  /// the impulses with the whole step since the sweep before.
   struct Progress {
-    S change = S(0);
-    S size = S(0);
+    S change_sq = S(0);
+    S along = S(0);
     Progress& operator+=(const Progress& other) {
-      change = std::max<S>(change, other.change);
-      size += other.size;
+      change_sq = std::max<S>(change_sq, other.change_sq);
+      along += other.along;
       return *this;
     }
   };
 
-  /// Last change and search direction of a contact's impulse; and of a body's velocities.
+  /// Step of a contact's impulse from sweep to sweep; and of a body's velocities.
   struct Step {
-    S dn = S(0);
-    S pn = S(0);
-    Vector3<S> dt = Vector3<S>::Zero();
-    Vector3<S> pt = Vector3<S>::Zero();
+    S n = S(0);
+    Vector3<S> t = Vector3<S>::Zero();
   };
   struct BodyStep {
     Vector3<S> v;
     Vector3<S> s;
-    Vector3<S> pv = Vector3<S>::Zero();
-    Vector3<S> ps = Vector3<S>::Zero();
+    Vector3<S> dv = Vector3<S>::Zero();
+    Vector3<S> ds = Vector3<S>::Zero();
   };
 
   void begin(const ContactProblem<S>& problem) {
@@ -92,21 +99,17 @@ class SequentialImpulses {
     });
   }
 
-  /// Velocities follow the impulses' step along the search direction: they are linear in the impulses.
-  void coast(ContactProblem<S>& problem, const S& beta) {
+  /// Velocities follow the impulses beyond their last step: they are linear in the impulses.
+  void coast(ContactProblem<S>& problem, const S& old, const S& beta) {
     parallelFor(problem.bodies.size(), 4 * chunk, [&](std::size_t slot) {
       BodyStep& step = bodySteps_[slot];
       Body& b = problem.bodies[slot];
-      const Vector3<S> pv = beta * step.pv;
-      const Vector3<S> dv = b.v - step.v;
-      b.v += pv;
-      step.pv = pv + dv;
+      step.dv = old * step.dv + Vector3<S>(b.v - step.v);
+      b.v += beta * step.dv;
       step.v = b.v;
       if (problem.friction) {
-        const Vector3<S> ps = beta * step.ps;
-        const Vector3<S> ds = b.s - step.s;
-        b.s += ps;
-        step.ps = ps + ds;
+        step.ds = old * step.ds + Vector3<S>(b.s - step.s);
+        b.s += beta * step.ds;
         step.s = b.s;
       }
     });
@@ -199,61 +202,58 @@ class SequentialImpulses {
     return {};
   }
 
-  /// First along the search direction of the step before, then to where this contact is right.
+  /// First on along the last step, then to where this contact is right.
   template <bool Friction>
   static Progress relax(ContactProblem<S>& problem, Row& row, Step& step, const S& beta) {
     Body& b1 = problem.bodies[row.slot1];
     Body& b2 = problem.bodies[row.slot2];
-    const S jn = row.jn + beta * step.pn;
-    step.pn = beta * step.pn + step.dn;
+    step.n *= beta;
+    const S jn = row.jn + step.n;
     const S next = jn + row.normalMass * (row.target - detail::normalVelocity(row, b1, b2));
     row.jn = next > S(0) ? next : S(0);
-    step.dn = row.jn - jn;
+    const S dj = row.jn - jn;
+    step.n += dj;
     Progress progress;
-    if (step.dn != S(0)) {
-      push(b1, b2, Vector3<S>(step.dn * row.n));
-      const S change = step.dn / row.normalMass;
-      progress.change = change < S(0) ? S(-change) : change;
-      progress.size = step.dn * change;
+    if (dj != S(0)) {
+      push(b1, b2, Vector3<S>(dj * row.n));
+      const S change = dj / row.normalMass;
+      progress.change_sq = change * change;
+      progress.along = step.n * change;
     }
     if constexpr (Friction) {
       if (row.staticFriction > S(0)) {
-        const Vector3<S> pt = beta * step.pt;
-        row.jt += pt;
-        step.pt = pt + step.dt;
+        step.t *= beta;
+        row.jt += step.t;
         if (row.jn > S(0) || row.jt != Vector3<S>::Zero()) {
-          progress += rub(row, b1, b2, step.dt);
-        } else {
-          step.dt = Vector3<S>::Zero();
+          progress += rub(row, b1, b2, step.t);
         }
       }
     }
     return progress;
   }
 
-  /// Friction of a row for its normal impulse.
-  static Progress rub(Row& row, Body& b1, Body& b2, Vector3<S>& dj) {
+  /// Friction of a row for its normal impulse. Sizes are compared as speeds, which are of order one.
+  static Progress rub(Row& row, Body& b1, Body& b2, Vector3<S>& step) {
+    using std::sqrt;
     const Vector3<S> slip = detail::slipVelocity(row, b1, b2);
     Vector3<S> jt = row.jt - row.tangentialMass * Vector3<S>(slip - row.slipTarget);
+    const S mobility = S(1) / row.tangentialMass;
+    const S size_sq = Vector3<S>(mobility * jt).squaredNorm();
     // A contact that keeps changing its mind between sticking and sliding slides: sweeps must end.
-    const S stick = (row.slides < patience ? row.staticFriction : row.kineticFriction) * row.jn;
-    const S size = detail::safeNorm(jt);
-    if (size > stick) {
+    const S stick = (row.slides < patience ? row.staticFriction : row.kineticFriction) * row.jn * mobility;
+    const bool slides = size_sq > stick * stick;
+    if (slides) {
       row.slides += row.sliding ? 0U : 1U;
-      row.sliding = true;
-      jt *= row.kineticFriction * row.jn / size;
-    } else {
-      row.sliding = false;
+      jt *= row.kineticFriction * row.jn * mobility / S(sqrt(size_sq));
     }
-    dj = jt - row.jt;
+    row.sliding = slides;
+    const Vector3<S> dj = jt - row.jt;
     row.jt = jt;
-    const S change = detail::safeNorm(dj);
-    if (!(change > S(0))) {
-      return {};
-    }
+    step += dj;
     push(b1, b2, dj);
     twist(row, b1, b2, dj);
-    return {S(change / row.tangentialMass), S(change * change / row.tangentialMass)};
+    const Vector3<S> change = mobility * dj;
+    return {change.squaredNorm(), change.dot(step)};
   }
 
   std::vector<Step> steps_;
