@@ -1,0 +1,149 @@
+#include "diagnostics.hpp"
+#include <gravel/core/parallel.hpp>
+
+#include <Eigen/Eigenvalues>
+
+#include <numeric>
+
+namespace gravel::runner {
+
+Diagnostics::Diagnostics(const std::filesystem::path& path) : path_(path), file_(path) {
+  file_.precision(17);
+  file_ << "time,step,dt,contacts,kinetic,rotational,potential,restitution,friction,damping,correction,work,"
+           "exchange,total,drift\n";
+  if (!file_) {
+    throw std::runtime_error("cannot write " + path.string());
+  }
+}
+
+void Diagnostics::record(const Space<double>& space) {
+  const EnergyLedger<double> e = space.energyLedger();
+  History& h = history_;
+  if (h.rows == 0) {
+    h.first = e;
+  }
+  h.last = e;
+  h.inPlay = std::max(h.inPlay, e.kinetic + e.rotational + std::abs(e.potential));
+  h.peakMotion = std::max(h.peakMotion, e.kinetic + e.rotational);
+  h.worstDrift = std::max(h.worstDrift, std::abs(h.drift()));
+  h.mostContacts = std::max(h.mostContacts, space.contactCount());
+  ++h.rows;
+  file_ << space.time() << ',' << space.steps() << ',' << space.getPreviousTimeStep() << ','
+        << space.contactCount() << ',' << e.kinetic << ',' << e.rotational << ',' << e.potential << ','
+        << e.restitution << ',' << e.friction << ',' << e.damping << ',' << e.correction << ',' << e.work
+        << ',' << e.exchange << ',' << e.total() << ',' << h.drift() << '\n';
+  file_.flush();
+  if (!file_) {
+    throw std::runtime_error("cannot write " + path_.string());
+  }
+}
+
+Cluster largestCluster(const Space<double>& space) {
+  const std::size_t n = space.n();
+  std::vector<std::size_t> parent(n);
+  std::iota(parent.begin(), parent.end(), std::size_t{0});
+  const auto root = [&](std::size_t i) {
+    while (parent[i] != i) {
+      i = parent[i] = parent[parent[i]];
+    }
+    return i;
+  };
+  for (const Contact<double>& contact : space.contacts()) {
+    if (contact.second != staticPartner) {
+      parent[root(contact.first)] = root(contact.second);
+    }
+  }
+  std::vector<double> mass(n, 0.0);
+  for (std::size_t i = 0; i < n; ++i) {
+    mass[root(i)] += space.body(i).mass();
+  }
+  Cluster cluster;
+  if (n == 0) {
+    return cluster;
+  }
+  const auto heaviest = static_cast<std::size_t>(std::max_element(mass.begin(), mass.end()) - mass.begin());
+  cluster.mass = mass[heaviest];
+  Vector3<double> centre = Vector3<double>::Zero();
+  double volume = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (root(i) == heaviest) {
+      const auto body = space.body(i);
+      ++cluster.bodies;
+      centre += body.mass() * body.position();
+      volume += 4.0 / 3.0 * pi<double>() * std::pow(body.radius(), 3);
+    }
+  }
+  if (!(cluster.mass > 0.0)) {
+    return cluster;
+  }
+  centre /= cluster.mass;
+  // Second moments: a homogeneous ellipsoid of half-axes a has M a^2 / 5 along each; so has a sphere of its
+  // own.
+  Matrix3<double> moments = Matrix3<double>::Zero();
+  for (std::size_t i = 0; i < n; ++i) {
+    if (root(i) == heaviest) {
+      const auto body = space.body(i);
+      const Vector3<double> x = body.position() - centre;
+      moments += body.mass() *
+                 (x * x.transpose() + Matrix3<double>::Identity() * (body.radius() * body.radius() / 5.0));
+    }
+  }
+  const Eigen::SelfAdjointEigenSolver<Matrix3<double>> solver(moments / cluster.mass, Eigen::EigenvaluesOnly);
+  const Vector3<double> halfAxes = (5.0 * solver.eigenvalues().cwiseMax(0.0)).cwiseSqrt();
+  cluster.axes = 2.0 * halfAxes.reverse();
+  const double space3 = 4.0 / 3.0 * pi<double>() * halfAxes.prod();
+  cluster.filling = space3 > 0.0 ? volume / space3 : 0.0;
+  return cluster;
+}
+
+double boundFraction(const Space<double>& space) {
+  const std::size_t n = space.n();
+  const ConservedQuantities<double> whole = space.conserved();
+  if (!(whole.mass > 0.0)) {
+    return 0.0;
+  }
+  const Vector3<double> drift = whole.momentum / whole.mass;
+  const double softening_sq = space.config().softening * space.config().softening;
+  const double bound = orderedSum(n, 64, 0.0, [&](std::size_t begin, std::size_t end) {
+    double part = 0.0;
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto body = space.body(i);
+      double depth = 0.0;
+      for (std::size_t j = 0; j < n; ++j) {
+        if (j != i) {
+          const auto other = space.body(j);
+          depth += space.getG() * other.mass() /
+                   std::sqrt((other.position() - body.position()).squaredNorm() + softening_sq);
+        }
+      }
+      part += 0.5 * (body.velocity() - drift).squaredNorm() < depth ? body.mass() : 0.0;
+    }
+    return part;
+  });
+  return bound / whole.mass;
+}
+
+double deepestOverlap(const Space<double>& space) {
+  double deepest = 0.0;
+  for (const Contact<double>& contact : space.contacts()) {
+    double radius = space.body(contact.first).radius();
+    if (contact.second != staticPartner) {
+      radius = std::min(radius, static_cast<double>(space.body(contact.second).radius()));
+    }
+    deepest = std::max(deepest, -contact.gap / radius);
+  }
+  return deepest;
+}
+
+Orbit orbitAbout(const Space<double>& space, std::size_t i, std::size_t centre) {
+  const auto body = space.body(i);
+  const auto sun = space.body(centre);
+  const Vector3<double> x = body.position() - sun.position();
+  const Vector3<double> v = body.velocity() - sun.velocity();
+  const double mu = space.getG() * (body.mass() + sun.mass());
+  const double a = 1.0 / (2.0 / x.norm() - v.squaredNorm() / mu);
+  const double e = ((v.squaredNorm() - mu / x.norm()) * x - x.dot(v) * v).norm() / mu;
+  return {a, e, a > 0.0 ? 2.0 * pi<double>() * std::sqrt(a * a * a / mu) : std::nan("")};
+}
+
+}  // namespace gravel::runner

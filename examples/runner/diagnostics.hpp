@@ -1,0 +1,65 @@
+#pragma once
+
+/// \file
+/// The table of diagnostics, and the measures that the summary speaks of.
+
+#include "scene.hpp"
+
+#include <filesystem>
+#include <fstream>
+
+namespace gravel::runner {
+
+/// What the ledger and the contacts said over the whole run.
+struct History {
+  EnergyLedger<double> first, last;
+  double inPlay = 0.0;  ///< most kinetic + rotational + |potential| energy seen: the scale of the drift
+  double worstDrift = 0.0;
+  double peakMotion = 0.0;  ///< most kinetic + rotational energy seen
+  std::size_t mostContacts = 0;
+  std::size_t rows = 0;
+
+  /// How far the ledger's total is from its start, over the energy in play.
+  double drift() const { return inPlay > 0.0 ? (last.total() - first.total()) / inPlay : 0.0; }
+};
+
+/// Writes a row of diagnostics.csv a call, and keeps the history.
+class Diagnostics {
+ public:
+  /// \throws std::runtime_error if the file cannot be written
+  explicit Diagnostics(const std::filesystem::path& path);
+  void record(const Space<double>& space);
+  const History& history() const { return history_; }
+
+ private:
+  std::filesystem::path path_;
+  std::ofstream file_;
+  History history_;
+};
+
+/// Bodies that touch one another, directly or through others.
+struct Cluster {
+  std::size_t bodies = 0;
+  double mass = 0.0;
+  Vector3<double> axes =
+      Vector3<double>::Zero();  ///< of the homogeneous ellipsoid of equal moments, longest first
+  double filling = 0.0;         ///< volume of its bodies over that of the ellipsoid
+};
+
+/// The heaviest cluster of the last step's contacts.
+Cluster largestCluster(const Space<double>& space);
+
+/// Share of the mass that cannot leave: bodies whose kinetic energy in the frame of the centre of mass is
+/// less than their depth in the potential of all others. O(N^2).
+double boundFraction(const Space<double>& space);
+
+/// Deepest overlap of two bodies over the smaller radius, at the last step's contacts.
+double deepestOverlap(const Space<double>& space);
+
+/// The two-body orbit of body i about body `centre` through its present place and velocity.
+struct Orbit {
+  double semiMajorAxis, eccentricity, period;  ///< NaN where there is none: the body flies past
+};
+Orbit orbitAbout(const Space<double>& space, std::size_t i, std::size_t centre);
+
+}  // namespace gravel::runner

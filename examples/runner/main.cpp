@@ -1,0 +1,247 @@
+/// gravel-run: reads a scene, simulates it, and writes frames, a table, a picture and a summary.
+
+#include "builtin_scene.hpp"
+#include "diagnostics.hpp"
+#include "picture.hpp"
+#include "progress.hpp"
+#include "scene.hpp"
+#include "summary.hpp"
+#include "text.hpp"
+
+#include <CLI/CLI.hpp>
+
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+#ifdef __linux__
+#include <unistd.h>
+#endif
+
+namespace {
+
+using namespace gravel;
+using namespace gravel::runner;
+namespace fs = std::filesystem;
+
+volatile std::sig_atomic_t stopRequested = 0;
+
+void requestStop(int) { stopRequested = 1; }
+
+struct Options {
+  std::string sceneFile, output;
+  std::optional<double> duration;
+  std::optional<std::size_t> frames;
+  int threads = 0;
+  bool noPicture = false, quiet = false, check = false, profile = false;
+};
+
+/// The space of a scene. \throws std::invalid_argument if the space refuses something
+Space<double> makeSpace(const Scene& scene) {
+  Space<double> space(scene.config);
+  space.setDomain(scene.domain);
+  space.setUniformField(scene.field);
+  for (const ScenePlane& plane : scene.planes) {
+    space.addPlane(plane.normal, plane.offset,
+                   plane.material ? space.addMaterial(*plane.material) : defaultMaterial);
+  }
+  for (const SceneBody& entry : scene.bodies) {
+    space.addBody(entry.body);
+  }
+  return space;
+}
+
+fs::path madeFolder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error || !fs::is_directory(folder)) {
+    throw std::runtime_error("cannot make the output folder " + folder.string() + ": " +
+                             (error ? error.message() : "there is a file of that name"));
+  }
+  return folder;
+}
+
+/// What is to be done at evenly spaced times; done at the first step at or after each, so that what is
+/// written never changes what is computed.
+class Schedule {
+ public:
+  Schedule(std::size_t times, double duration)
+      : count_(times), interval_(times > 1 ? duration / static_cast<double>(times - 1) : duration) {}
+  bool isDue(double time) {
+    if (next_ >= count_ || time < static_cast<double>(next_) * interval_) {
+      return false;
+    }
+    while (next_ < count_ && time >= static_cast<double>(next_) * interval_) {
+      ++next_;
+    }
+    return true;
+  }
+
+ private:
+  std::size_t count_, next_ = 0;
+  double interval_;
+};
+
+/// Lets threads that wait sleep rather than spin. A step has some dozens of short parallel parts; where other
+/// programs want the same processors, spinning threads take away the time of those that they wait for, and
+/// make a step ten times slower. OpenMP reads this setting only when a program is loaded, so it is loaded
+/// again.
+void waitPassively(char** argv) {
+#ifdef __linux__
+  if (std::getenv("OMP_WAIT_POLICY") == nullptr && setenv("OMP_WAIT_POLICY", "passive", 0) == 0) {
+    execv("/proc/self/exe", argv);  // returns only if it fails, and then nothing is lost but speed
+  }
+#else
+  static_cast<void>(argv);
+#endif
+}
+
+int run(const Options& options) {
+  Scene scene = options.sceneFile.empty() ? readScene(builtinScene, builtinSceneName)
+                                          : readSceneFile(options.sceneFile);
+  scene.duration = options.duration.value_or(scene.duration);
+  scene.output.frames = options.frames.value_or(scene.output.frames);
+
+  Space<double> space = [&] {
+    try {
+      return makeSpace(scene);
+    } catch (const std::invalid_argument& error) {
+      throw SceneError((options.sceneFile.empty() ? builtinSceneName : options.sceneFile) + ": " +
+                       error.what());
+    }
+  }();
+  const bool talks = !options.quiet;
+  if (talks || options.check) {
+    std::printf("%s: %s, %s\n", scene.title.empty() ? scene.name.c_str() : scene.title.c_str(),
+                counted(space.n(), "body", "bodies").c_str(), sceneTime(scene.duration, scene.units).c_str());
+  }
+  if (options.check) {
+    return 0;
+  }
+
+  const fs::path folder =
+      madeFolder(options.output.empty() ? fs::path("out") / scene.name : fs::path(options.output));
+  Diagnostics diagnostics(folder / "diagnostics.csv");
+  std::optional<VtkSeries> series;
+  if (scene.output.frames > 0) {
+    series.emplace(folder / "frames", scene.name);
+  }
+  Schedule frames(scene.output.frames, scene.duration);
+  Schedule rows(std::max<std::size_t>(scene.output.rows, 2), scene.duration);
+  Schedule marks(scene.picture.trails ? 2000 : 0, scene.duration);
+  Trails trails(scene.picture.trails ? space.n() : 0);
+  Progress progress(scene.units, scene.duration, options.quiet);
+  space.setLog([](const char* line) { std::fprintf(stderr, "%s\n", line); });
+
+  const auto observe = [&] {
+    if (rows.isDue(space.time())) {
+      diagnostics.record(space);
+    }
+    if (frames.isDue(space.time())) {
+      series->write(vtkPoints(space.bodies()), space.time());
+    }
+    if (marks.isDue(space.time())) {
+      for (std::size_t i = 0; i < trails.size(); ++i) {
+        trails[i].emplace_back(space.body(i).position());
+      }
+    }
+    progress.show(space, diagnostics.history().drift());
+  };
+
+  observe();
+  const double near = 1.0 - 1e-9;  // of the end: a step that lands beside it by rounding is the last one
+  while (space.time() < scene.duration && stopRequested == 0) {
+    if (space.time() + space.getTimeStep() < scene.duration * near) {
+      space.computeDynamics(space.steps());
+    } else {
+      space.advanceTo(scene.duration);
+    }
+    observe();
+  }
+  if (stopRequested != 0) {
+    diagnostics.record(space);
+  }
+  progress.finish(space, diagnostics.history().drift());
+
+  const RunFacts facts{stopRequested != 0, progress.seconds(), threadCount()};
+  const std::string words = summary(scene, space, diagnostics.history(), facts);
+  {
+    std::ofstream file(folder / "summary.txt");
+    if (!(file << words)) {
+      throw std::runtime_error("cannot write " + (folder / "summary.txt").string());
+    }
+  }
+  if (talks) {
+    std::printf("\n%s\n", words.c_str());
+  }
+  if (options.profile) {
+    space.printProfilingReport();
+  }
+  const auto tell = [&](const char* what, const fs::path& path) {
+    if (talks) {
+      std::printf("%-9s %s\n", what, path.string().c_str());
+      std::fflush(stdout);
+    }
+  };
+  tell("Table:", folder / "diagnostics.csv");
+  tell("Summary:", folder / "summary.txt");
+  if (series) {
+    tell("Frames:", series->index().string() + "  (" + std::to_string(series->frames()) + ", for ParaView)");
+  }
+  if (!options.noPicture) {
+    writePicture(folder / "picture.png", scene, space, trails);
+    tell("Picture:", folder / "picture.png");
+  }
+  return facts.interrupted ? 130 : 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  waitPassively(argv);
+  CLI::App app{
+      "Simulates a scene of bodies that attract each other, collide, rub, spin and settle.\n"
+      "Without a scene file: a cloud of 2000 rocks that becomes a rubble pile.",
+      "gravel-run"};
+  Options options;
+  app.add_option("scene", options.sceneFile, "scene file (TOML), see examples/scenes");
+  app.add_option("-o,--output", options.output,
+                 "folder for what is written; default: out/<name of the scene>");
+  app.add_option("--duration", options.duration, "time to simulate, in place of the scene's own")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--frames", options.frames,
+                 "number of frames for ParaView, in place of the scene's own; 0: none");
+  app.add_option("--threads", options.threads, "threads; default: all (or OMP_NUM_THREADS)")
+      ->check(CLI::Range(1, 4096));
+  app.add_flag("--no-picture", options.noPicture, "draw no picture");
+  app.add_flag("-q,--quiet", options.quiet, "print errors only");
+  app.add_flag("--profile", options.profile, "print at the end what each phase of a step cost");
+  app.add_flag("--check", options.check, "only read the scene and say what is wrong with it");
+  app.set_version_flag("--version", format("gravel %d.%d.%d", version.major, version.minor, version.patch));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+#ifdef _OPENMP
+  if (options.threads > 0) {
+    omp_set_num_threads(options.threads);
+  }
+#endif
+  std::signal(SIGINT, requestStop);
+  std::signal(SIGTERM, requestStop);
+  try {
+    return run(options);
+  } catch (const SceneError& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 2;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "gravel-run: %s\n", error.what());
+    return 1;
+  }
+}

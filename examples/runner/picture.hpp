@@ -1,0 +1,19 @@
+#pragma once
+
+/// \file
+/// The picture of a scene's bodies as they are now.
+
+#include "scene.hpp"
+
+#include <filesystem>
+
+namespace gravel::runner {
+
+/// The places of every body at some times of the run.
+using Trails = std::vector<std::vector<Vector3<double>>>;
+
+/// \throws std::runtime_error if the file cannot be written
+void writePicture(const std::filesystem::path& path, const Scene& scene, const Space<double>& space,
+                  const Trails& trails);
+
+}  // namespace gravel::runner

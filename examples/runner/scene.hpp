@@ -1,0 +1,90 @@
+#pragma once
+
+/// \file
+/// A scene as a value, and how it is read from TOML.
+
+#include "render.hpp"
+#include <gravel/gravel.hpp>
+
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace gravel::runner {
+
+struct SceneBody {
+  Body<double> body;
+  std::string name;  ///< empty for the bodies of a generator
+  Colour colour = Colour(0.36F, 0.32F, 0.27F);
+  Surface surface = Surface::Rock;
+};
+
+struct ScenePlane {
+  Vector3<double> normal = Vector3<double>::UnitZ();
+  double offset = 0.0;
+  std::optional<Material<double>> material;
+  std::optional<Colour> colour;  ///< not drawn without one
+};
+
+/// What units the scene's numbers have: names for the output only, nothing is converted.
+struct Units {
+  std::string length = "m";
+  std::string time = "s";
+  std::string mass = "kg";
+  bool areSI() const { return length == "m" && time == "s" && mass == "kg"; }
+};
+
+struct OutputOptions {
+  std::size_t frames = 60;  ///< .vtp files, the start and the end among them; 0 for none
+  std::size_t rows = 300;   ///< of the table of diagnostics
+};
+
+struct PictureOptions {
+  Vector3<double> direction = Vector3<double>(1.0, -0.6, 0.5);  ///< from the scene to the eye
+  Vector3<double> up = Vector3<double>::UnitZ();
+  std::optional<Vector3<double>> target;  ///< else the middle of the bodies
+  std::optional<double> span;             ///< height of what is seen; else so that nearly all bodies are
+  double fieldOfView = 30.0;
+  std::size_t width = 1200;
+  std::size_t height = 900;
+  double smallestRadius = 0.0;
+  bool stars = false;
+  bool trails = false;
+};
+
+struct Scene {
+  std::string name = "scene";  ///< the file's name without its ending; names the output
+  std::string title;
+  double duration = 0.0;
+  Units units;
+  SimulationConfig<double> config;
+  Domain<double> domain = Domain<double>::open();
+  Vector3<double> field = Vector3<double>::Zero();
+  std::vector<SceneBody> bodies;
+  std::vector<ScenePlane> planes;
+  OutputOptions output;
+  PictureOptions picture;
+};
+
+/// What the scene says of the body with this id; null for the random bodies of [simulation] bodyCount, which
+/// come first.
+inline const SceneBody* sceneBody(const Scene& scene, BodyId id) {
+  const std::uint64_t index = toInteger(id) - scene.config.bodyCount;
+  return index < scene.bodies.size() ? &scene.bodies[static_cast<std::size_t>(index)] : nullptr;
+}
+
+/// What is wrong with a scene file, one line a fault: `file:line: what, which value, what is allowed`.
+class SceneError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// \param file names the text in messages
+/// \throws SceneError that lists every fault found
+Scene readScene(const std::string& text, const std::string& file);
+
+/// As above from a file. \throws SceneError also if it cannot be read
+Scene readSceneFile(const std::string& path);
+
+}  // namespace gravel::runner

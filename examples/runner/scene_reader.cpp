@@ -1,0 +1,366 @@
+#include "../scenes/scenes.hpp"
+#include "scene.hpp"
+#include "table_reader.hpp"
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+namespace gravel::runner {
+
+namespace {
+
+using Range = detail::Range<double>;
+
+Range positive() {
+  return {std::numeric_limits<double>::min(), std::numeric_limits<double>::max(), "finite, > 0"};
+}
+Range notNegative() { return detail::nonNegative<double>(); }
+
+/// [simulation]: every field of SimulationConfig under its own name, by the library's own list of them.
+void readSimulation(TableReader& reader, SimulationConfig<double>& config) {
+  forEachSetting(config, [&]<class T>(const Setting<double>& setting, T& value) {
+    if constexpr (std::is_same_v<T, double>) {
+      reader.real(setting.name, value, setting.range);
+    } else if constexpr (std::is_same_v<T, bool>) {
+      reader.flag(setting.name, value);
+    } else if constexpr (std::is_enum_v<T>) {
+      std::vector<std::string> names(EnumNames<T>::values.begin(), EnumNames<T>::values.end());
+      std::size_t chosen = 0;
+      if (reader.choice(setting.name, names, chosen)) {
+        value = static_cast<T>(chosen);
+      }
+    } else {
+      std::size_t read = 0;
+      if (reader.count(setting.name, read)) {
+        if (read > std::numeric_limits<T>::max()) {
+          reader.faults().add(reader.where(),
+                              std::string("\"") + setting.name + "\" in [simulation] is too large");
+        }
+        value = static_cast<T>(read);
+      }
+    }
+  });
+  if (!reader.faults().any()) {
+    try {
+      config.validate();
+    } catch (const std::invalid_argument& error) {
+      reader.faults().add(reader.where(), error.what());
+    }
+  }
+}
+
+void readLook(TableReader& reader, SceneBody& look) {
+  static const std::vector<std::string> surfaces{"rock", "smooth", "striped", "glowing"};
+  std::size_t surface = static_cast<std::size_t>(look.surface);
+  if (reader.choice("surface", surfaces, surface)) {
+    look.surface = static_cast<Surface>(surface);
+  }
+  reader.colour("colour", look.colour);
+}
+
+void readBody(TableReader& reader, std::vector<SceneBody>& bodies) {
+  SceneBody entry;
+  Body<double>& body = entry.body;
+  reader.text("name", entry.name);
+  reader.vector("position", body.position);
+  reader.vector("velocity", body.velocity);
+  reader.vector("angularVelocity", body.angularVelocity);
+  Eigen::Vector4d orientation(0, 0, 0, 1);
+  reader.numbers<4>("orientation", orientation);
+  body.orientation.coeffs() = orientation;
+  reader.real("radius", body.radius, notNegative());
+  double density = 0.0;
+  const bool hasMass = reader.has("mass");
+  const bool hasDensity = reader.has("density");
+  reader.real("mass", body.mass, notNegative());
+  reader.real("density", density, positive());
+  if (hasMass == hasDensity) {
+    reader.missing(hasMass ? "room for both \"mass\" and \"density\": give one" : "\"mass\" or \"density\"");
+  } else if (hasDensity) {
+    body.mass = density * 4.0 / 3.0 * pi<double>() * body.radius * body.radius * body.radius;
+  }
+  double inertia = 0.0;
+  if (reader.real("inertia", inertia, positive())) {
+    body.inertia = inertia;
+  }
+  reader.flag("fixed", body.fixed);
+  readLook(reader, entry);
+  if (!reader.faults().any()) {
+    try {
+      validate(body, entry.name.empty() ? "body " + std::to_string(bodies.size()) : "\"" + entry.name + "\"");
+    } catch (const std::invalid_argument& error) {
+      reader.faults().add(reader.where(), error.what());
+    }
+  }
+  bodies.push_back(entry);
+}
+
+void append(TableReader& reader, std::vector<SceneBody>& bodies, const SceneBody& look,
+            const std::vector<Body<double>>& made) {
+  try {
+    for (const Body<double>& body : made) {
+      SceneBody entry = look;
+      entry.body = body;
+      validate(body, "body " + std::to_string(bodies.size()));
+      bodies.push_back(entry);
+    }
+  } catch (const std::invalid_argument& error) {
+    reader.faults().add(reader.where(), error.what());
+  }
+}
+
+/// Runs a generator unless a fault stands already; what it refuses is a fault of its table.
+template <class Generate>
+void generate(TableReader& reader, std::vector<SceneBody>& bodies, const SceneBody& look, Generate&& make) {
+  if (reader.faults().any()) {
+    return;
+  }
+  try {
+    append(reader, bodies, look, make());
+  } catch (const std::invalid_argument& error) {
+    reader.faults().add(reader.where(), error.what());
+  }
+}
+
+std::uint64_t readSeed(TableReader& reader) {
+  std::size_t seed = 1;
+  reader.count("seed", seed);
+  return seed;
+}
+
+void readCloud(TableReader& reader, std::vector<SceneBody>& bodies) {
+  scenes::CloudOptions options;
+  Vector3<double> position = Vector3<double>::Zero(), velocity = Vector3<double>::Zero();
+  reader.count("count", options.count, 1);
+  options.seed = readSeed(reader);
+  reader.vector("position", position);
+  reader.vector("velocity", velocity);
+  reader.real("radius", options.radius, positive());
+  reader.interval("bodyRadius", options.bodyRadius, positive());
+  reader.real("sizeExponent", options.sizeExponent, notNegative());
+  reader.interval("density", options.density, positive());
+  reader.vector("spin", options.spin);
+  reader.real("velocityDispersion", options.velocityDispersion, notNegative());
+  reader.real("bodySpin", options.bodySpin, notNegative());
+  SceneBody look;
+  readLook(reader, look);
+  generate(reader, bodies, look, [&] {
+    auto made = scenes::rubbleCloud<double>(options);
+    for (Body<double>& body : made) {
+      body.position += position;
+      body.velocity += velocity;
+    }
+    return made;
+  });
+}
+
+void readColumn(TableReader& reader, std::vector<SceneBody>& bodies) {
+  scenes::ColumnOptions options;
+  reader.count("count", options.count, 1);
+  options.seed = readSeed(reader);
+  reader.vector("base", options.base);
+  reader.vector("velocity", options.velocity);
+  reader.real("radius", options.radius, positive());
+  reader.interval("bodyRadius", options.bodyRadius, positive());
+  reader.real("density", options.density, positive());
+  SceneBody look;
+  readLook(reader, look);
+  generate(reader, bodies, look, [&] { return scenes::grainColumn<double>(options); });
+}
+
+/// Balls of diameter 1 and mass 1 in the periodic cube that [domain] then has to be.
+void readGas(TableReader& reader, std::vector<SceneBody>& bodies) {
+  std::size_t count = 1000;
+  double fraction = 0.1;
+  reader.count("count", count, 1);
+  reader.real("fraction", fraction, {1e-9, 0.3, "0 to 0.3"});
+  const std::uint64_t seed = readSeed(reader);
+  SceneBody look;
+  look.surface = Surface::Smooth;
+  readLook(reader, look);
+  generate(reader, bodies, look, [&] { return scenes::randomGas<double>(count, fraction, seed); });
+}
+
+void readMaterial(TableReader& reader, const SimulationConfig<double>& config, ScenePlane& plane) {
+  Material<double> material;
+  material.restitution = config.coeffRestitution;
+  material.kineticFriction = config.coeffFriction;
+  material.staticFriction = std::max(config.coeffStaticFriction, config.coeffFriction);
+  material.tangentialRestitution = config.tangentialRestitution;
+  const Range unit = detail::unitInterval<double>();
+  const bool own = reader.has("restitution") || reader.has("friction") || reader.has("staticFriction") ||
+                   reader.has("tangentialRestitution");
+  reader.real("restitution", material.restitution, unit);
+  reader.real("friction", material.kineticFriction, notNegative());
+  material.staticFriction = std::max(material.staticFriction, material.kineticFriction);
+  if (reader.real("staticFriction", material.staticFriction, notNegative()) &&
+      material.staticFriction < material.kineticFriction) {
+    reader.faults().add(reader.where(), "\"staticFriction\" is " +
+                                            detail::formatReal(material.staticFriction) +
+                                            "; allowed: at least \"friction\", " +
+                                            detail::formatReal(material.kineticFriction));
+  }
+  reader.real("tangentialRestitution", material.tangentialRestitution, unit);
+  if (own) {
+    plane.material = material;
+  }
+  Colour colour;
+  if (reader.colour("colour", colour)) {
+    plane.colour = colour;
+  }
+}
+
+void readPlane(TableReader& reader, const SimulationConfig<double>& config, std::vector<ScenePlane>& planes) {
+  ScenePlane plane;
+  reader.vector("normal", plane.normal);
+  reader.real("offset", plane.offset);
+  if (!(plane.normal.stableNorm() > 0.0)) {
+    reader.faults().add(reader.where(), "\"normal\" in [[plane]] is (0, 0, 0); allowed: any direction");
+  } else {
+    plane.normal.stableNormalize();
+  }
+  readMaterial(reader, config, plane);
+  planes.push_back(plane);
+}
+
+/// Up to six planes that look inwards: the faces of the box from `low` to `high`, without those in `open`.
+void readBox(TableReader& reader, const SimulationConfig<double>& config, std::vector<ScenePlane>& planes) {
+  static const std::vector<std::string> faces{"-x", "+x", "-y", "+y", "-z", "+z"};
+  Vector3<double> low = Vector3<double>::Constant(-1), high = Vector3<double>::Constant(1);
+  if (!reader.vector("low", low) || !reader.vector("high", high)) {
+    reader.missing("\"low\" and \"high\", two opposite corners");
+  } else if (!((high - low).minCoeff() > 0.0)) {
+    reader.faults().add(reader.where(), "\"high\" in [[box]] is " + detail::formatVector(high) +
+                                            "; allowed: more than \"low\", " + detail::formatVector(low) +
+                                            ", along each axis");
+  }
+  std::string open;
+  std::size_t openFace = faces.size();
+  reader.choice("open", faces, openFace);
+  ScenePlane look;
+  readMaterial(reader, config, look);
+  for (std::size_t face = 0; face < faces.size(); ++face) {
+    if (face != openFace) {
+      const auto axis = static_cast<Eigen::Index>(face / 2);
+      const bool upper = face % 2 != 0;
+      ScenePlane plane = look;
+      plane.normal = Vector3<double>::Unit(axis) * (upper ? -1.0 : 1.0);
+      plane.offset = upper ? -high[axis] : low[axis];
+      planes.push_back(plane);
+    }
+  }
+}
+
+void readDomain(TableReader& reader, Domain<double>& domain) {
+  static const std::vector<std::string> kinds{"open", "periodic"};
+  std::size_t kind = 0;
+  Vector3<double> lengths = Vector3<double>::Zero();
+  reader.choice("kind", kinds, kind);
+  const bool hasLengths = reader.numbers<3>("lengths", lengths, positive());
+  if (kind == 1 && hasLengths) {
+    domain = Domain<double>::periodic(lengths);
+  } else if (kind == 1 && !reader.has("lengths")) {
+    reader.missing("\"lengths\", the box's three sides");
+  }
+}
+
+void readPicture(TableReader& reader, PictureOptions& picture) {
+  static const std::vector<std::string> skies{"room", "stars"};
+  Vector3<double> target = Vector3<double>::Zero();
+  double span = 0.0;
+  reader.vector("direction", picture.direction);
+  reader.vector("up", picture.up);
+  if (!(picture.direction.cross(picture.up).stableNorm() > 1e-9 * picture.direction.stableNorm())) {
+    reader.faults().add(reader.where(), "\"direction\" in [picture] is " +
+                                            detail::formatVector(picture.direction) +
+                                            "; allowed: any direction but that of \"up\"");
+  }
+  if (reader.vector("target", target)) {
+    picture.target = target;
+  }
+  if (reader.real("span", span, positive())) {
+    picture.span = span;
+  }
+  reader.real("fieldOfView", picture.fieldOfView, {1.0, 120.0, "1 to 120 degrees"});
+  const auto size = [&](const char* key, std::size_t& pixels) {
+    if (reader.count(key, pixels, 16) && pixels > 10000) {
+      reader.faults().add(reader.where(), std::string("\"") + key + "\" in [picture] is " +
+                                              std::to_string(pixels) + "; allowed: 16 to 10000 pixels");
+    }
+  };
+  size("width", picture.width);
+  size("height", picture.height);
+  reader.real("smallestRadius", picture.smallestRadius, {0.0, 1000.0, "0 to 1000 pixels"});
+  std::size_t sky = 0;
+  if (reader.choice("background", skies, sky)) {
+    picture.stars = sky == 1;
+  }
+  reader.flag("trails", picture.trails);
+}
+
+Scene interpret(const toml::table& table, Faults& faults) {
+  Scene scene;
+  TableReader top(table, "the top level", faults);
+  top.text("title", scene.title);
+  if (!top.real("duration", scene.duration, positive()) && !top.has("duration")) {
+    top.missing("\"duration\", the time to simulate");
+  }
+  top.table("units", [&](TableReader& reader) {
+    reader.text("length", scene.units.length);
+    reader.text("time", scene.units.time);
+    reader.text("mass", scene.units.mass);
+  });
+  top.table("simulation", [&](TableReader& reader) { readSimulation(reader, scene.config); });
+  top.table("domain", [&](TableReader& reader) { readDomain(reader, scene.domain); });
+  top.table("field", [&](TableReader& reader) { reader.vector("acceleration", scene.field); });
+  top.tables("plane", [&](TableReader& reader) { readPlane(reader, scene.config, scene.planes); });
+  top.tables("box", [&](TableReader& reader) { readBox(reader, scene.config, scene.planes); });
+  top.tables("body", [&](TableReader& reader) { readBody(reader, scene.bodies); });
+  top.tables("cloud", [&](TableReader& reader) { readCloud(reader, scene.bodies); });
+  top.tables("column", [&](TableReader& reader) { readColumn(reader, scene.bodies); });
+  top.tables("gas", [&](TableReader& reader) { readGas(reader, scene.bodies); });
+  top.table("output", [&](TableReader& reader) {
+    reader.count("frames", scene.output.frames);
+    reader.count("rows", scene.output.rows);
+  });
+  top.table("picture", [&](TableReader& reader) { readPicture(reader, scene.picture); });
+  top.finish();
+  if (!faults.any() && scene.bodies.empty() && scene.config.bodyCount == 0) {
+    top.missing("bodies: give [[body]], [[cloud]], [[column]], [[gas]] or [simulation] bodyCount");
+  }
+  return scene;
+}
+
+}  // namespace
+
+Scene readScene(const std::string& text, const std::string& file) {
+  Faults faults(file);
+  try {
+    const toml::table table = toml::parse(text, file);
+    Scene scene = interpret(table, faults);
+    if (faults.any()) {
+      throw SceneError(faults.text());
+    }
+    scene.name = std::filesystem::path(file).stem().string();
+    return scene;
+  } catch (const toml::parse_error& error) {
+    faults.add(error.source(), std::string(error.description()));
+    throw SceneError(faults.text());
+  }
+}
+
+Scene readSceneFile(const std::string& path) {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) {
+    throw SceneError(path + ": is a folder; allowed: a scene file");
+  }
+  std::ifstream in(path, std::ios::binary);
+  std::stringstream text;
+  if (!in || !(text << in.rdbuf())) {
+    throw SceneError(path + ": cannot be read, or is empty");
+  }
+  return readScene(text.str(), path);
+}
+
+}  // namespace gravel::runner

@@ -1,0 +1,141 @@
+#include "summary.hpp"
+#include "text.hpp"
+
+#include <algorithm>
+
+namespace gravel::runner {
+
+namespace {
+
+std::string capital(std::string text) {
+  text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
+  return text;
+}
+
+std::string percent(double share) {
+  return share > 0.9995 ? "100 %" : format(share < 0.1 ? "%.2g %%" : "%.1f %%", 100.0 * share);
+}
+
+/// Contacts that a body has on average; one between two bodies counts for both.
+double contactsPerBody(const Space<double>& space) {
+  std::size_t sides = 0;
+  for (const Contact<double>& contact : space.contacts()) {
+    sides += contact.second == staticPartner ? 1 : 2;
+  }
+  return static_cast<double>(sides) / static_cast<double>(space.n());
+}
+
+/// Sentences on what the contacts built.
+void addContacts(std::string& text, const Scene& scene, const Space<double>& space, const History& history) {
+  const std::size_t n = space.n();
+  if (history.mostContacts == 0) {
+    text += "Nothing touched.\n";
+    return;
+  }
+  text += capital(counted(space.contactCount(), "contact", "contacts")) + " at the end" +
+          format(" (%.1f a body; most at once: %zu)", contactsPerBody(space), history.mostContacts);
+  if (space.contactCount() > 0) {
+    text += format(", the deepest overlap is %.1e of a radius", deepestOverlap(space));
+  }
+  text += ".\n";
+  if (!(space.getG() > 0.0)) {
+    return;
+  }
+  const Cluster pile = largestCluster(space);
+  const double mass = space.conserved().mass;
+  if (pile.bodies >= 10) {
+    text +=
+        format("The largest pile holds %zu of %zu bodies and %s of the mass; it measures about %s x %s x %s",
+               pile.bodies, n, percent(pile.mass / mass).c_str(),
+               sceneLength(pile.axes[0], scene.units).c_str(), sceneLength(pile.axes[1], scene.units).c_str(),
+               sceneLength(pile.axes[2], scene.units).c_str()) +
+        format(" and rock fills %.0f %% of it.\n", 100.0 * pile.filling);
+  }
+}
+
+void addGravity(std::string& text, const Scene& scene, const Space<double>& space, const History& history) {
+  const std::size_t n = space.n();
+  if (!(space.getG() > 0.0) || n < 2 || n > 30000) {
+    return;
+  }
+  if (n > 20 || history.mostContacts > 0) {
+    text += "Bound by gravity: " + percent(boundFraction(space)) + " of the mass.\n";
+    return;
+  }
+  std::size_t heaviest = 0;
+  for (std::size_t i = 1; i < n; ++i) {
+    heaviest = space.body(i).mass() > space.body(heaviest).mass() ? i : heaviest;
+  }
+  const auto name = [&](std::size_t i) {
+    const SceneBody* known = sceneBody(scene, space.body(i).id());
+    return known != nullptr && !known->name.empty() ? known->name
+                                                    : "body " + std::to_string(toInteger(space.body(i).id()));
+  };
+  text += "Orbits about " + name(heaviest) + ":\n";
+  for (std::size_t i = 0; i < n; ++i) {
+    if (i != heaviest) {
+      const Orbit orbit = orbitAbout(space, i, heaviest);
+      text += format("  %-10s", name(i).c_str());
+      text += std::isnan(orbit.period)
+                  ? " flies past\n"
+                  : format(" semi-major axis %.4g %s, eccentricity %.4f, period %s\n", orbit.semiMajorAxis,
+                           scene.units.length.c_str(), orbit.eccentricity,
+                           sceneTime(orbit.period, scene.units).c_str());
+    }
+  }
+}
+
+void addEnergy(std::string& text, const History& h) {
+  const double motion = h.last.kinetic + h.last.rotational;
+  const double taken = h.last.restitution + h.last.friction + h.last.damping;
+  struct Part {
+    double energy;
+    const char* what;
+  };
+  if (taken > 1e-12 * h.inPlay) {
+    text += "Of the energy that was lost,";
+    bool first = true;
+    for (const Part& part : {Part{h.last.restitution, "inelastic hits"}, Part{h.last.friction, "friction"},
+                             Part{h.last.damping, "damping"}}) {
+      if (std::abs(part.energy) > 5e-4 * taken) {
+        text += format(first ? " %s took %.1f %%" : ", %s %.1f %%", part.what, 100.0 * part.energy / taken);
+        first = false;
+      }
+    }
+    text += ".\n";
+  }
+  if (std::abs(h.last.correction) > 1e-6 * h.inPlay) {
+    text += format("Pushing overlaps apart %s %.1e of the energy in play.\n",
+                   h.last.correction < 0.0 ? "put in" : "took", std::abs(h.last.correction) / h.inPlay);
+  }
+  if (h.peakMotion > 0.0) {
+    const double left = motion / h.peakMotion;
+    text += left < 1e-4 ? format("It has come to rest: %.1e of the most kinetic energy is left.\n", left)
+                        : format("It still moves: %.2g of the most kinetic energy is left.\n", left);
+  }
+  text += format("The energy ledger is off by %.1e of the energy in play at the end, %.1e at most.\n",
+                 std::abs(h.drift()), h.worstDrift);
+}
+
+}  // namespace
+
+std::string summary(const Scene& scene, const Space<double>& space, const History& history,
+                    const RunFacts& facts) {
+  std::string text;
+  text += (facts.interrupted ? "Stopped early. " : "") + counted(space.n(), "body", "bodies") +
+          format(" of %.4g %s together, followed for %s in %s of %s.\n", space.conserved().mass,
+                 scene.units.mass.c_str(), sceneTime(space.time(), scene.units).c_str(),
+                 counted(space.steps(), "step", "steps").c_str(),
+                 space.config().adaptiveTimeStep ? "changing length" : "equal length");
+  if (space.n() > 0) {
+    addContacts(text, scene, space, history);
+    addGravity(text, scene, space, history);
+    addEnergy(text, history);
+  }
+  text += format("That took %s with %s: %.0f steps a second.\n", wallTime(facts.seconds).c_str(),
+                 counted(static_cast<std::size_t>(facts.threads), "thread", "threads").c_str(),
+                 static_cast<double>(space.steps()) / std::max(facts.seconds, 1e-9));
+  return text;
+}
+
+}  // namespace gravel::runner
