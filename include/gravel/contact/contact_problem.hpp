@@ -5,45 +5,12 @@
 /// and one row a contact. Layouts and user's arrays end here.
 
 #include <gravel/contact/contact_coloring.hpp>
+#include <gravel/contact/contact_settings.hpp>
 #include <gravel/core/parallel.hpp>
 
 #include <vector>
 
 namespace gravel {
-
-/// How contacts are solved.
-template <Real Scalar>
-struct ContactSettings {
-  /// [m s^-1] >= 0: restitution acts on an approach faster than this plus what a resting contact picks up in
-  /// a step, 2 |a_rel.n| dt; a slower one stops. The same holds for tangential restitution.
-  Scalar restitutionThreshold = Scalar(0);
-  /// [1] > 0: sweeps end when the largest change of a velocity in a sweep is at most this times the largest
-  /// speed of approach among the contacts. The error of the impulses is this times the number of sweeps that
-  /// a disturbance takes through the pile.
-  Scalar tolerance = Scalar(1e-6);
-  int maxIterations = 100;  ///< >= 1: sweeps at most
-  bool warmStart = true;    ///< begin from the impulses of the last step
-  bool accelerate = true;   ///< momentum between sweeps; off: plain Gauss-Seidel
-};
-
-/// What a solve did.
-template <Real Scalar>
-struct ContactReport {
-  std::size_t contacts = 0;
-  std::size_t colours = 0;
-  int iterations = 0;           ///< sweeps
-  Scalar residual = Scalar(0);  ///< [1] largest change of a velocity in the last sweep / largest approach
-  Scalar restitutionLoss = Scalar(0);  ///< [J] energy taken by normal impulses
-  Scalar frictionLoss = Scalar(0);     ///< [J] energy taken by tangential impulses
-  Scalar driftWork = Scalar(0);  ///< [J] energy put in by moving boundaries and by the shear of the domain
-};
-
-/// Impulse of a contact on its second body [N s]; on the first its opposite.
-template <Real Scalar>
-struct ContactImpulse {
-  Scalar normal = Scalar(0);  ///< >= 0, along Contact::normal
-  Vector3<Scalar> tangential = Vector3<Scalar>::Zero();
-};
 
 namespace detail {
 
@@ -259,7 +226,8 @@ class ContactProblem {
     const S drift_n = row.n.dot(drift);
     const S v_n = detail::normalVelocity(row, b1, b2) + drift_n;
     const S threshold = speedIn(settings.restitutionThreshold + S(2) * relativeAcceleration(c, source) * dt);
-    const S allowed = c.gap > S(0) ? (dt > S(0) ? speedIn(c.gap / dt) : std::numeric_limits<S>::max()) : S(0);
+    const S allowed =
+        c.gap > S(0) ? (dt > S(0) ? speedIn(c.gap / dt) : Eigen::NumTraits<S>::highest()) : S(0);
     const bool impact = -v_n > threshold && -v_n > allowed;
     // A contact that separates may come to approach as fast, pushed by others, and bounces in the next step:
     // J_n (v_n^- + v_n^+) <= 0 for every contact, so no choice of restitutions makes energy (see

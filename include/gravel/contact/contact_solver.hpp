@@ -23,17 +23,6 @@ struct StoredImpulse {
   friend bool operator==(const StoredImpulse&, const StoredImpulse&) = default;
 };
 
-/// \throws std::invalid_argument naming the setting, its value and what is allowed
-template <Real S>
-void validate(const ContactSettings<S>& settings) {
-  detail::require("restitutionThreshold", settings.restitutionThreshold, detail::nonNegative<S>());
-  detail::require("contact tolerance", settings.tolerance,
-                  detail::Range<S>{std::numeric_limits<S>::min(), S(1), "> 0, <= 1"});
-  if (settings.maxIterations < 1) {
-    detail::refuse("contact maxIterations", std::to_string(settings.maxIterations), ">= 1");
-  }
-}
-
 /// Contacts in, velocities out. Keeps its workspace and the last step's impulses.
 /// Determinism: all of it is a function of the contacts in the order of their keys; neither indices nor
 /// threads change a bit.

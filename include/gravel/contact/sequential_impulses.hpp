@@ -40,7 +40,7 @@ class SequentialImpulses {
     const bool friction = problem.friction;
     S beta(0);
     S limit(1);
-    S leastSize = std::numeric_limits<S>::max();
+    S leastSize = Eigen::NumTraits<S>::highest();
     int age = 0;
     begin(problem);
     while (true) {

@@ -1,0 +1,58 @@
+#pragma once
+
+/// \file
+/// What one asks of a contact solver, and what it answers.
+
+#include <gravel/core/check.hpp>
+
+#include <string>
+
+namespace gravel {
+
+/// How contacts are solved.
+template <Real Scalar>
+struct ContactSettings {
+  /// [m s^-1] >= 0: restitution acts on an approach faster than this plus what a resting contact picks up in
+  /// a step, 2 |a_rel.n| dt; a slower one stops. The same holds for tangential restitution.
+  Scalar restitutionThreshold = Scalar(0);
+  /// [1] > 0: sweeps end when the largest change of a velocity in a sweep is at most this times the largest
+  /// speed of approach among the contacts. The error of the impulses is this times the number of sweeps that
+  /// a disturbance takes through the pile.
+  Scalar tolerance = Scalar(1e-6);
+  int maxIterations = 100;  ///< >= 1: sweeps at most
+  bool warmStart = true;    ///< begin from the impulses of the last step
+  bool accelerate = true;   ///< momentum between sweeps; off: plain Gauss-Seidel
+};
+
+/// What a solve did.
+template <Real Scalar>
+struct ContactReport {
+  std::size_t contacts = 0;
+  std::size_t colours = 0;
+  int iterations = 0;           ///< sweeps
+  Scalar residual = Scalar(0);  ///< [1] largest change of a velocity in the last sweep / largest approach
+  Scalar restitutionLoss = Scalar(0);  ///< [J] energy taken by normal impulses
+  Scalar frictionLoss = Scalar(0);     ///< [J] energy taken by tangential impulses
+  Scalar driftWork = Scalar(0);  ///< [J] energy put in by moving boundaries and by the shear of the domain
+};
+
+/// Impulse of a contact on its second body [N s]; on the first its opposite.
+template <Real Scalar>
+struct ContactImpulse {
+  Scalar normal = Scalar(0);  ///< >= 0, along Contact::normal
+  Vector3<Scalar> tangential = Vector3<Scalar>::Zero();
+
+  friend bool operator==(const ContactImpulse&, const ContactImpulse&) = default;
+};
+
+/// \throws std::invalid_argument naming the setting, its value and what is allowed
+template <Real S>
+void validate(const ContactSettings<S>& settings) {
+  detail::require("restitutionThreshold", settings.restitutionThreshold, detail::nonNegative<S>());
+  detail::require("contact tolerance", settings.tolerance, detail::Range<S>{S(1e-30), S(1), "1e-30 to 1"});
+  if (settings.maxIterations < 1) {
+    detail::refuse("contact maxIterations", std::to_string(settings.maxIterations), ">= 1");
+  }
+}
+
+}  // namespace gravel
