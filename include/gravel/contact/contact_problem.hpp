@@ -38,6 +38,7 @@ struct SolverRow {
   std::uint32_t slot1;
   std::uint32_t slot2;
   std::uint32_t contact;
+  bool impact;
   std::uint32_t slides;  ///< how often it went from sticking to sliding
   bool sliding;
 };
@@ -229,6 +230,7 @@ class ContactProblem {
     const S allowed =
         c.gap > S(0) ? (dt > S(0) ? speedIn(c.gap / dt) : Eigen::NumTraits<S>::highest()) : S(0);
     const bool impact = -v_n > threshold && -v_n > allowed;
+    row.impact = impact;
     // A contact that separates may come to approach as fast, pushed by others, and bounces in the next step:
     // J_n (v_n^- + v_n^+) <= 0 for every contact, so no choice of restitutions makes energy (see
     // contact_energy.hpp).

@@ -41,6 +41,7 @@ template <Real Scalar>
 struct ContactImpulse {
   Scalar normal = Scalar(0);  ///< >= 0, along Contact::normal
   Vector3<Scalar> tangential = Vector3<Scalar>::Zero();
+  bool impact = false;  ///< came in faster than the threshold, so that restitution acted
 
   friend bool operator==(const ContactImpulse&, const ContactImpulse&) = default;
 };

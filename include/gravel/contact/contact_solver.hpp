@@ -149,7 +149,7 @@ class ContactSolver {
 
   void takeImpulses() {
     for (const detail::SolverRow<S>& row : problem_.rows) {
-      impulses_[row.contact] = {problem_.impulseOut(row.jn), problem_.impulseOut(row.jt)};
+      impulses_[row.contact] = {problem_.impulseOut(row.jn), problem_.impulseOut(row.jt), row.impact};
     }
   }
 

@@ -6,11 +6,11 @@
 /// For a body with speed v relative to the centre of mass (so that a boost changes nothing) and
 /// acceleration a, the time in which its motion changes by its own size is
 ///   tau_i = sqrt(v^2 + a l_i) / a        the turning time v/a; sqrt(l/a) where a body starts from rest
-/// with l_i = its radius, or the softening, or a hundredth of the mean spacing, whichever is largest. A pair
-/// that closes in at speed u over a gap g must not pass through the contact unseen:
-///   tau_ij = max(g, l_ij) / u,  l_ij the smaller radius
-/// The step is h = eta min(tau_i), and not more than the least tau_ij / 4. It follows the state at the start
-/// of the step, so that a long orbit drifts in energy slowly; a fixed step does not.
+/// with l_i = its radius, or the softening, or a hundredth of the mean spacing, whichever is largest. The
+/// step is h = eta min(tau_i); and no sphere moves by more than a quarter of its radius in a step, so that
+/// contacts are met before they are deep. (Planets are points at the scale of their orbits: take a fixed step
+/// there, or radius 0.) The step follows the state at its start, so that a long orbit drifts in energy
+/// slowly; a fixed step does not.
 
 #include <gravel/bodies/bodies.hpp>
 #include <gravel/core/parallel.hpp>
@@ -49,7 +49,7 @@ Scalar orderedMin(std::size_t n, std::size_t chunk, const Scalar& start, F&& f) 
 
 }  // namespace detail
 
-/// eta min(tau_i) over the movable bodies, within the limits. O(N).
+/// The step by the rules above over the movable bodies, within the limits. O(N).
 template <Real Scalar, class Layout>
 Scalar stepFromMotion(const Bodies<Scalar, Layout>& bodies, const Scalar& softening,
                       const StepLimits<Scalar>& limits) {
@@ -87,29 +87,6 @@ Scalar stepFromMotion(const Bodies<Scalar, Layout>& bodies, const Scalar& soften
         return Scalar(sqrt(v_sq + a * l) / a);
       });
   return std::clamp<Scalar>(limits.factor * least, limits.smallest, limits.largest);
-}
-
-/// The least tau_ij / 4 over candidate pairs (`first`, `second` are indices), within the limits. O(pairs).
-template <Real Scalar, class Layout, class Pairs, class Separation>
-Scalar stepFromApproach(const Bodies<Scalar, Layout>& bodies, const Pairs& pairs, Separation&& separation,
-                        const StepLimits<Scalar>& limits) {
-  using std::min;
-  const Scalar least =
-      detail::orderedMin(pairs.size(), 4096, Scalar(limits.largest * Scalar(4)), [&](std::size_t k) {
-        const auto one = bodies[pairs[k].first];
-        const auto two = bodies[pairs[k].second];
-        const Vector3<Scalar> r_ij = separation(one.position(), two.position());
-        const Scalar r = r_ij.norm();
-        const Scalar u = r > Scalar(0) ? Scalar(-r_ij.dot(two.velocity() - one.velocity()) / r) : Scalar(0);
-        if (!(u > Scalar(0))) {
-          return Scalar(limits.largest * Scalar(4));
-        }
-        const Scalar r1 = one.radius();
-        const Scalar r2 = two.radius();
-        const Scalar l = r1 > Scalar(0) && r2 > Scalar(0) ? min(r1, r2) : std::max<Scalar>(r1, r2);
-        return Scalar(std::max<Scalar>(r - r1 - r2, l) / u);
-      });
-  return std::clamp<Scalar>(least / Scalar(4), limits.smallest, limits.largest);
 }
 
 }  // namespace gravel

@@ -92,10 +92,12 @@ void kickAndDrift(Bodies<Scalar, Layout>& bodies, const Scalar& kick, const Scal
       return;
     }
     auto&& v = body.velocity();
-    v += body.acceleration() * kick;
     auto&& w = body.angularVelocity();
-    if (torques) {
-      w += body.angularAcceleration() * kick;
+    if (!(kick == Scalar(0))) {
+      v += body.acceleration() * kick;
+      if (torques) {
+        w += body.angularAcceleration() * kick;
+      }
     }
     if (!(drift == Scalar(0))) {
       body.position() += v * drift;
@@ -109,20 +111,34 @@ void kickAndDrift(Bodies<Scalar, Layout>& bodies, const Scalar& kick, const Scal
 
 }  // namespace detail
 
+/// Nothing to do between the first kick and the first drift.
+struct NoDeparture {
+  explicit operator bool() const { return false; }
+  template <class Scalar>
+  void operator()(const Scalar&) const {}
+};
+
 /// Advances all bodies by one step h. Accelerations must be those of the present positions, and are at the
 /// end. \param forces  called s times with the part of h that has passed [s]: accelerations at the present
 /// positions \param arrival called once, when positions are final and the last forces are not yet evaluated
 /// Cost: s force evaluations, s + 1 passes over the bodies. Bits do not depend on the number of threads.
-template <Real Scalar, class Layout, class Forces, class Arrival>
+template <Real Scalar, class Layout, class Forces, class Arrival, class Departure = NoDeparture>
 void integrate(IntegratorKind kind, Bodies<Scalar, Layout>& bodies, const Scalar& h, bool torques,
-               Forces&& forces, Arrival&& arrival) {
+               Forces&& forces, Arrival&& arrival, Departure&& departure = {}) {
   const std::span<const long double> weights = traitsOf(kind).weights;
   const Scalar half_h = h / Scalar(2);
   Scalar pending(0);
   Scalar passed(0);
   for (std::size_t k = 0; k < weights.size(); ++k) {
     const Scalar w = Scalar(weights[k]);
-    detail::kickAndDrift(bodies, Scalar(pending + w * half_h), Scalar(w * h), torques);
+    const Scalar kick = pending + w * half_h;
+    if (k == 0 && departure) {
+      detail::kickAndDrift(bodies, kick, Scalar(0), torques);
+      departure(kick);
+      detail::kickAndDrift(bodies, Scalar(0), Scalar(w * h), torques);
+    } else {
+      detail::kickAndDrift(bodies, kick, Scalar(w * h), torques);
+    }
     if (k + 1 == weights.size()) {
       arrival();
     }

@@ -25,7 +25,6 @@ class ContactStage {
 
   const std::vector<Contact<Scalar>>& contacts() const { return contacts_; }
   const ContactReport<Scalar>& report() const { return report_; }
-  const std::vector<Pair>& candidates() const { return candidates_; }
 
   MaterialId addMaterial(const Material<Scalar>& material) {
     validate(material, "the new material");
@@ -70,9 +69,9 @@ class ContactStage {
   /// Finds all contacts at the present positions.
   void detect(const Bodies& bodies, const Config& config, const Scalar& time, Profiler& profiler) {
     contacts_.clear();
+    coloured_ = false;
     const char* reason = reasonToSkip(bodies);
     if (reason != nullptr) {
-      candidates_.clear();
       profiler.skip(Phase::NeighbourSearch, reason);
       profiler.skip(Phase::NarrowPhase, reason);
       return;
@@ -80,8 +79,7 @@ class ContactStage {
     {
       const Profiler::Scope scope(profiler, Phase::NeighbourSearch);
       neighbours_.setKind(config.broadPhase);
-      candidates_ = neighbours_.update(bodies.positions(), bodies.radii(), bodies.ids(), bodies.revision(),
-                                       domain, time);
+      neighbours_.update(bodies.positions(), bodies.radii(), bodies.ids(), bodies.revision(), domain, time);
     }
     const Profiler::Scope scope(profiler, Phase::NarrowPhase);
     materials_[0] = defaultOf(config);
@@ -89,7 +87,7 @@ class ContactStage {
     for (const Plane<Scalar>& plane : planes) {
       walls_.push_back({plane.normal, plane.offset, materials_[static_cast<std::size_t>(plane.material)]});
     }
-    narrow_.find(candidates_, bodies, domain, materials_, walls_, {time, config.epsilon, Scalar(0)},
+    narrow_.find(neighbours_.pairs(), bodies, domain, materials_, walls_, {time, config.epsilon, Scalar(0)},
                  contacts_);
   }
 
@@ -102,10 +100,7 @@ class ContactStage {
       profiler.skip(Phase::PositionalCorrection, "no contacts");
       return;
     }
-    {
-      const Profiler::Scope scope(profiler, Phase::Colouring);
-      solver_.begin(contacts_, bodies);
-    }
+    colour(bodies, profiler);
     if (config.positionalCorrectionFactor == Scalar(0)) {
       profiler.skip(Phase::PositionalCorrection, "positionalCorrectionFactor is 0");
       return;
@@ -132,23 +127,35 @@ class ContactStage {
     return work;
   }
 
-  /// Solves all contacts together on the present velocities.
-  /// \param h [s] the step that these contacts stand for
-  void solve(Bodies& bodies, const Config& config, const Scalar& h, Profiler& profiler) {
-    report_ = {};
+  /// Solves all contacts together on the present velocities. Adds to the report of the step.
+  /// \param h    [s] length of the step
+  /// \param kick [s] for which the present accelerations have just acted on the velocities
+  void solve(Bodies& bodies, const Config& config, const Scalar& h, const Scalar& kick, Profiler& profiler) {
     if (contacts_.empty()) {
       profiler.skip(Phase::ContactSolve, "no contacts");
       solver_.forget();
       return;
     }
+    colour(bodies, profiler);
     const Profiler::Scope scope(profiler, Phase::ContactSolve);
     ContactSettings<Scalar> settings = solver_.settings();
     settings.restitutionThreshold = std::max(config.restitutionThreshold, config.epsilon);
     settings.tolerance = config.contactTolerance;
     settings.maxIterations = static_cast<int>(config.contactIterations);
     solver_.setSettings(settings);
-    report_ = solver_.solve(bodies, h);
+    const ContactReport<Scalar> half = solver_.solve(bodies, h);
+    report_.contacts = half.contacts;
+    report_.colours = half.colours;
+    report_.iterations += half.iterations;
+    report_.residual = std::max(report_.residual, half.residual);
+    report_.restitutionLoss += half.restitutionLoss;
+    report_.frictionLoss += half.frictionLoss;
+    report_.driftWork += half.driftWork;
+    bookKick(bodies, kick);
   }
+
+  /// A new step: its report starts empty.
+  void beginStep() { report_ = {}; }
 
   /// Impulses of the last step [N s], in the order of contacts().
   std::span<const ContactImpulse<Scalar>> impulses() const {
@@ -174,6 +181,17 @@ class ContactStage {
       keys.insert(keys.end(), {stored.key1, stored.key2});
       numbers.insert(numbers.end(), {j.normal, j.tangential[0], j.tangential[1], j.tangential[2]});
     }
+    std::vector<std::uint64_t> names;
+    std::vector<Scalar> places;
+    for (const Contact<Scalar>& c : contacts_) {
+      const Material<Scalar>& m = c.material;
+      names.insert(names.end(), {c.first, c.second, c.key1, c.key2});
+      places.insert(places.end(), {c.normal[0], c.normal[1], c.normal[2], c.gap, c.arm1, c.arm2, c.drift[0],
+                                   c.drift[1], c.drift[2], m.restitution, m.staticFriction, m.kineticFriction,
+                                   m.tangentialRestitution});
+    }
+    out.array("names of contacts", names.data(), names.size());
+    out.array("contacts", places.data(), places.size());
     out.array("keys of impulses", keys.data(), keys.size());
     out.array("impulses", numbers.data(), numbers.size());
     out.value("step of impulses", solver_.memoryStep());
@@ -192,15 +210,32 @@ class ContactStage {
     const std::vector<Scalar> sides = in.array<Scalar>("planes");
     const auto surfaces = in.array<std::uint32_t>("materials of planes");
     materials_ = in.array<Material<Scalar>>("materials");
+    const auto names = in.array<std::uint64_t>("names of contacts");
+    const std::vector<Scalar> places = in.array<Scalar>("contacts");
     const auto keys = in.array<std::uint64_t>("keys of impulses");
     const std::vector<Scalar> impulses = in.array<Scalar>("impulses");
-    if (sides.size() != 4 * surfaces.size() || impulses.size() != 2 * keys.size() || materials_.empty()) {
+    if (sides.size() != 4 * surfaces.size() || impulses.size() != 2 * keys.size() || materials_.empty() ||
+        places.size() * 4 != names.size() * 13) {
       in.fail("holds lists of different lengths");
     }
     for (std::size_t p = 0; p < surfaces.size(); ++p) {
       checkMaterial(surfaces[p], "plane " + std::to_string(p));
       const Scalar* side = &sides[4 * p];
       planes.push_back({{side[0], side[1], side[2]}, side[3], MaterialId{surfaces[p]}});
+    }
+    for (std::size_t k = 0; k < names.size() / 4; ++k) {
+      const std::uint64_t* name = &names[4 * k];
+      const Scalar* c = &places[13 * k];
+      contacts_.push_back({static_cast<std::uint32_t>(name[0]),
+                           static_cast<std::uint32_t>(name[1]),
+                           name[2],
+                           name[3],
+                           {c[0], c[1], c[2]},
+                           c[3],
+                           c[4],
+                           c[5],
+                           {c[9], c[10], c[11], c[12]},
+                           {c[6], c[7], c[8]}});
     }
     std::vector<StoredImpulse<Scalar>> memory(keys.size() / 2);
     for (std::size_t k = 0; k < memory.size(); ++k) {
@@ -223,6 +258,35 @@ class ContactStage {
       detail::refuse(
           "material of " + who, std::to_string(id),
           "0 (the space's own) or a material of addMaterial, below " + std::to_string(materials_.size()));
+    }
+  }
+
+  /// What rests, rolls or slides feels the contact's force F = J/kick and its accelerations a at the same
+  /// time. Over that time the force does the work F.(u_0 + u_1) kick/2 with u_0 the velocity of contact
+  /// before the kick, where the solver, which sees u_0 + a kick, books J.(u_0 + a kick + u_1)/2. A blow is
+  /// short, and its loss stays as booked.
+  void bookKick(const Bodies& bodies, const Scalar& kick) {
+    const auto accelerationOf = [&](std::uint32_t i) -> Vector3<Scalar> {
+      return i == staticPartner || bodies[i].isFixed() ? Vector3<Scalar>(Vector3<Scalar>::Zero())
+                                                       : Vector3<Scalar>(bodies[i].acceleration());
+    };
+    const std::span<const ContactImpulse<Scalar>> impulses = solver_.impulses();
+    for (std::size_t k = 0; k < impulses.size(); ++k) {
+      const ContactImpulse<Scalar>& j = impulses[k];
+      if (j.normal > Scalar(0) && !j.impact) {
+        const Contact<Scalar>& c = contacts_[k];
+        const Vector3<Scalar> dv = (accelerationOf(c.second) - accelerationOf(c.first)) * (kick / Scalar(2));
+        report_.restitutionLoss += j.normal * c.normal.dot(dv);
+        report_.frictionLoss += j.tangential.dot(dv);
+      }
+    }
+  }
+
+  void colour(const Bodies& bodies, Profiler& profiler) {
+    if (!coloured_) {
+      const Profiler::Scope scope(profiler, Phase::Colouring);
+      solver_.begin(contacts_, bodies);
+      coloured_ = true;
     }
   }
 
@@ -266,11 +330,11 @@ class ContactStage {
   std::vector<HalfSpace<Scalar>> walls_;
   NeighbourList<Scalar> neighbours_;
   NarrowPhase<Scalar> narrow_;
-  std::vector<Pair> candidates_;
   std::vector<Contact<Scalar>> contacts_;
   ContactSolver<Scalar> solver_;
   ContactReport<Scalar> report_;
   bool moved_ = false;
+  bool coloured_ = false;  // solver_ knows the present contacts
 };
 
 }  // namespace gravel

@@ -12,11 +12,12 @@
 namespace gravel {
 
 /// n spheres that do not overlap, of radii 0.5 m to 1 m and the given density [kg m^-3], spread over a ball
-/// about the origin with about a quarter of its volume filled; speeds up to 0.1 m s^-1 and spins up to
-/// 0.1 rad s^-1 along each axis. They sit on a jittered cubic lattice, so that no two can touch. Equal
+/// about the origin with about a quarter of its volume filled; velocities up to `speed` [m s^-1] and spins up
+/// to 0.1 rad s^-1 along each axis. They sit on a jittered cubic lattice, so that no two can touch. Equal
 /// arguments give equal bodies on every machine.
 template <Real Scalar>
-std::vector<Body<Scalar>> randomBodies(std::size_t n, const Scalar& density, std::uint64_t seed) {
+std::vector<Body<Scalar>> randomBodies(std::size_t n, const Scalar& density, const Scalar& speed,
+                                       std::uint64_t seed) {
   constexpr double largest = 1.0;
   constexpr double spacing = 2.2 * largest;  // leaves +-0.1 m to jitter
   const auto side = static_cast<std::int64_t>(std::ceil(std::cbrt(static_cast<double>(n) * 2.0))) + 2;
@@ -47,7 +48,7 @@ std::vector<Body<Scalar>> randomBodies(std::size_t n, const Scalar& density, std
     body.radius = Scalar(radius);
     body.mass = Scalar(4.0 / 3.0) * pi<Scalar>() * density * Scalar(radius * radius * radius);
     body.position = (sites[i].position + vector(1, 0.1 * largest)).template cast<Scalar>();
-    body.velocity = vector(4, 0.1).template cast<Scalar>();
+    body.velocity = vector(4, 1.0).template cast<Scalar>() * speed;
     body.angularVelocity = vector(7, 0.1).template cast<Scalar>();
     const Vector3<double> axis = random.direction(10);
     const double half_angle = random.uniform(12, 0.0, pi<double>());

@@ -155,6 +155,8 @@ class Space : public Settings<Scalar> {
  private:
   friend class ::SpaceTest;
 
+  struct Departure;
+
   std::size_t checkedIndex(std::size_t i) const;
   void handleCollision(BodyProxy& b1, BodyProxy& b2);
   void initializeBodies(std::size_t n, Scalar dens, unsigned int seed);
@@ -168,6 +170,7 @@ class Space : public Settings<Scalar> {
   void applyDamping();
 
   void step(const Scalar& h, std::size_t iteration);
+  void solveContacts(const Scalar& kick);
   void refreshForces();
   void rememberPlaces();
   bool placesChanged() const;

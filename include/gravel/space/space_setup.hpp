@@ -22,8 +22,15 @@ Space<Scalar, Layout>::Space(const SimulationConfig<Scalar>& config, typename Bo
 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::initializeBodies(std::size_t n, Scalar dens, unsigned int seed) {
+  using std::sqrt;
   bodies_.reserve(bodies_.size() + n);
-  for (const Body<Scalar>& body : randomBodies<Scalar>(n, dens, seed)) {
+  // A tenth of the escape speed from a ball of that density, whose radius is about 2 m cbrt(n): bound, but
+  // not at rest. 0.1 m/s without gravity.
+  const Scalar radius = Scalar(2) * Scalar(std::cbrt(static_cast<double>(n)));
+  const Scalar speed = getG() == Scalar(0)
+                           ? Scalar(0.1)
+                           : Scalar(radius * sqrt(getG() * dens * pi<Scalar>() / Scalar(3)) / Scalar(10));
+  for (const Body<Scalar>& body : randomBodies<Scalar>(n, dens, speed, seed)) {
     bodies_.add(body);
   }
 }
@@ -61,7 +68,7 @@ void Space<Scalar, Layout>::removeBody(BodyId id) {
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::reorderBodies() {
   bodies_.reorder(mortonOrder(bodies_.positions()));
-  rememberPlaces();  // forces moved along with their bodies
+  forcesValid_ = false;
 }
 
 template <Real Scalar, class Layout>

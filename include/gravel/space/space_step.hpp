@@ -4,12 +4,18 @@
 /// Members of `Space` that make a step.
 ///
 /// Order of a step of length h, with a(x) the acceleration of the last evaluation:
-///   1. kick and drift by the integrator's table; when positions are final
-///   2. contacts are found there, and overlaps shrink by moving bodies (no velocity changes);
+///   1. half a kick by the integrator's table; contacts of the last step are solved together, so that what
+///   rests
+///      on something does not sink in the drift; drift;
+///   2. when positions are final, contacts are found there, and overlaps shrink by moving bodies (no velocity
+///      changes);
 ///   3. forces at those positions, last kick;
-///   4. contacts are solved together on the velocities of the step's end, so that a body at rest has velocity
-///      zero, and each contact's impulse is its force times h;
+///   4. contacts are solved together on the velocities of the step's end, with restitution;
 ///   5. damping; 6. time passes, next step size; 7. diagnostics.
+/// So contact forces take part in both halves of the step as all forces do in velocity Verlet (the velocity
+/// projections of RATTLE, Andersen 1983, J. Comput. Phys. 52, 24, for inequality constraints): resting,
+/// rolling and sliding are of second order in h, and a body at rest has velocity zero. A single solve at the
+/// end of the step lets piles sink by g h^2/2 and be lifted again every step, which spins a rolling pile up.
 
 #include <gravel/space/space.hpp>
 
@@ -43,16 +49,27 @@ void Space<Scalar, Layout>::advanceTo(Scalar time) {
   }
 }
 
+/// Between the first kick and the drift: the contacts that the last step left.
+template <Real Scalar, class Layout>
+struct Space<Scalar, Layout>::Departure {
+  Space* space;
+  explicit operator bool() const { return space->contactCount() > 0; }
+  void operator()(const Scalar& kick) const { space->solveContacts(kick); }
+};
+
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::step(const Scalar& h, std::size_t iteration) {
   if (!bodies_.empty()) {
     bodies_.validateAll();
     contact_.checkMaterials(bodies_);
     ledgerOpen_ = true;
+    previous_dt_ = h;
     refreshForces();
     const auto forces = [&](const Scalar& passed) {
       force_.evaluate(bodies_, getG(), this->config_.softening, Scalar(time_ + passed), profiler_);
     };
+    contact_.beginStep();
+    const Departure departure{this};
     const auto arrival = [&] {
       contact_.wrap(bodies_, Scalar(time_ + h));
       buildCollisionGraph();
@@ -60,7 +77,7 @@ void Space<Scalar, Layout>::step(const Scalar& h, std::size_t iteration) {
     };
     {
       const Profiler::Scope scope(profiler_, Phase::Integration);
-      integrate(this->config_.integrator, bodies_, h, force_.hasTorques(), forces, arrival);
+      integrate(this->config_.integrator, bodies_, h, force_.hasTorques(), forces, arrival, departure);
     }
     rememberPlaces();
     left_.correction += contact_.separationWork(force_, bodies_);
@@ -68,16 +85,17 @@ void Space<Scalar, Layout>::step(const Scalar& h, std::size_t iteration) {
       const Scalar power = force_.hookPower(bodies_);
       left_.work -= (hookPower_ + power) * h / Scalar(2);
     }
-    previous_dt_ = h;
-    resolveCollisions();
+    solveContacts(Scalar(traitsOf(this->config_.integrator).weights.back()) * h / Scalar(2));
+    left_.restitution += contact_.report().restitutionLoss;
+    left_.friction += contact_.report().frictionLoss;
     applyDamping();
     if (force_.hook) {
       hookPower_ = force_.hookPower(bodies_);
     }
   } else {
+    previous_dt_ = h;
     profiler_.skip(Phase::Integration, "no bodies");
   }
-  previous_dt_ = h;
   const Scalar sum = time_ + (h + timeRest_);
   timeRest_ = (h + timeRest_) - (sum - time_);
   time_ = sum;
@@ -91,6 +109,7 @@ template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::refreshForces() {
   if (!forcesValid_ || placesChanged()) {
     applyGravity();
+    buildCollisionGraph();
     rememberPlaces();
     hookPower_ = force_.hookPower(bodies_);
   }
@@ -132,10 +151,13 @@ void Space<Scalar, Layout>::buildCollisionGraph() {
 }
 
 template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::solveContacts(const Scalar& kick) {
+  contact_.solve(bodies_, this->config_, previous_dt_, kick, profiler_);
+}
+
+template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::resolveCollisions() {
-  contact_.solve(bodies_, this->config_, previous_dt_, profiler_);
-  left_.restitution += contact_.report().restitutionLoss;
-  left_.friction += contact_.report().frictionLoss;
+  solveContacts(Scalar(0));
 }
 
 template <Real Scalar, class Layout>
@@ -158,11 +180,7 @@ void Space<Scalar, Layout>::updateAdaptiveTimeStep() {
   }
   const Profiler::Scope scope(profiler_, Phase::TimeStep);
   const StepLimits<Scalar> limits{c.timeStepFactor, c.minTimeStep, c.timeStep};
-  const auto separation = [&](const auto& x1, const auto& x2) {
-    return contact_.domain.minimumImage(Vector(x2) - Vector(x1), time_);
-  };
-  dt_ = std::min(stepFromMotion(bodies_, c.softening, limits),
-                 stepFromApproach(bodies_, contact_.candidates(), separation, limits));
+  dt_ = stepFromMotion(bodies_, c.softening, limits);
 }
 
 template <Real Scalar, class Layout>

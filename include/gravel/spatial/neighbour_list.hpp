@@ -138,7 +138,7 @@ class NeighbourList {
     if (!domain.isOpen()) {
       scale += domain.lengths().maxCoeff();
     }
-    const S slack = S(32) * S(std::numeric_limits<S>::epsilon()) * scale;
+    const S slack = S(32) * roundoff() * scale;
     search_.findPairs(positions, radii, ids, S(room_ + slack), domain, time, pairs_);
     revision_ = revision;
     domain_ = domain;
@@ -162,6 +162,11 @@ class NeighbourList {
       return S(0);
     }
     return std::min(std::max(S(S(goodLife) * perUpdate), thinnest), thickest);
+  }
+
+  static S roundoff() {
+    using Limits = std::numeric_limits<S>;
+    return Limits::is_specialized ? S(Limits::epsilon()) : S(std::numeric_limits<double>::epsilon());
   }
 
   static constexpr std::size_t chunk = 8192;
