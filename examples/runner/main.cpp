@@ -213,7 +213,12 @@ int main(int argc, char** argv) {
   app.add_option("-o,--output", options.output,
                  "folder for what is written; default: out/<name of the scene>");
   app.add_option("--duration", options.duration, "time to simulate, in place of the scene's own")
-      ->check(CLI::PositiveNumber);
+      ->check([](const std::string& text) {
+        double time = 0.0;
+        return CLI::detail::lexical_cast(text, time) && time > 0.0 && std::isfinite(time)
+                   ? std::string()
+                   : "is " + text + "; allowed: a finite number > 0";
+      });
   app.add_option("--frames", options.frames,
                  "number of frames for ParaView, in place of the scene's own; 0: none");
   app.add_option("--threads", options.threads, "threads; default: all (or OMP_NUM_THREADS)")

@@ -9,6 +9,7 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -41,34 +42,38 @@ class Faults {
   std::vector<std::pair<toml::source_index, std::string>> list_;
 };
 
-/// Insertions, deletions and exchanges that turn a into b (Levenshtein).
-inline std::size_t editDistance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) {
+/// Insertions, deletions and exchanges that turn `wrong` into `name` (Levenshtein), or with `within` into the
+/// likest part of it; capitals count as small letters.
+inline std::size_t editDistance(std::string_view wrong, std::string_view name, bool within) {
+  const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
+  std::vector<std::size_t> row(name.size() + 1, 0);
+  for (std::size_t j = 0; j <= name.size() && !within; ++j) {
     row[j] = j;
   }
-  for (std::size_t i = 1; i <= a.size(); ++i) {
+  for (std::size_t i = 1; i <= wrong.size(); ++i) {
     std::size_t diagonal = row[0];
     row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
+    for (std::size_t j = 1; j <= name.size(); ++j) {
       const std::size_t above = row[j];
-      row[j] = std::min({above + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0 : 1)});
+      const std::size_t change = lower(wrong[i - 1]) == lower(name[j - 1]) ? 0 : 1;
+      row[j] = std::min({above + 1, row[j - 1] + 1, diagonal + change});
       diagonal = above;
     }
   }
-  return row[b.size()];
+  return within ? *std::min_element(row.begin(), row.end()) : row.back();
 }
 
 /// The end of a message: a likely name if one is near, and all that are allowed.
 inline std::string allowedNames(std::string_view wrong, const std::vector<std::string>& names) {
   std::string likely;
-  std::size_t nearest = std::max<std::size_t>(2, wrong.size() / 3) + 1;
+  std::size_t nearest = wrong.size() / 3 + 1;  // one letter in three may be wrong
   for (const std::string& name : names) {
-    std::size_t distance = editDistance(wrong, name);
-    if (wrong.size() >= 4 && name.find(wrong) != std::string::npos) {
-      distance = std::min<std::size_t>(distance, 2);
+    // A name that holds the word within it ("restitution" for coeffRestitution) comes after a misspelt whole.
+    std::size_t distance = editDistance(wrong, name, false);
+    if (wrong.size() >= 5) {
+      distance = std::min(distance, editDistance(wrong, name, true) + 1);
     }
-    if (distance < nearest) {
+    if (distance <= nearest && (likely.empty() || distance < nearest)) {
       nearest = distance;
       likely = name;
     }
