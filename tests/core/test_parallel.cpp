@@ -111,8 +111,8 @@ TEST_CASE("parallel: ordered sums add the chunks pairwise in their order", "[par
   CHECK(orderedSum(std::size_t{50}, 10, 0.0, harmonic) == expected);
 }
 
-// 2^23 equal terms. Pairwise, each is in 23 sums, each of which rounds by half an epsilon (Higham 1993); added one
-// after the other, the sum is off by 6 percent.
+// 2^23 equal terms. Pairwise, each is in 23 sums, each of which rounds by half an epsilon (Higham 1993);
+// added one after the other, the sum is off by 6 percent.
 TEST_CASE("parallel: the rounding error of an ordered sum grows with the logarithm of the number of chunks",
           "[parallel]") {
   const std::size_t n = 1U << 23U;
