@@ -38,7 +38,10 @@ void Diagnostics::record(const Space<double>& space) {
   }
 }
 
-Cluster largestCluster(const Space<double>& space) {
+namespace {
+
+/// Indices of the bodies of the heaviest cluster.
+std::vector<std::size_t> heaviestCluster(const Space<double>& space) {
   const std::size_t n = space.n();
   std::vector<std::size_t> parent(n);
   std::iota(parent.begin(), parent.end(), std::size_t{0});
@@ -57,42 +60,64 @@ Cluster largestCluster(const Space<double>& space) {
   for (std::size_t i = 0; i < n; ++i) {
     mass[root(i)] += space.body(i).mass();
   }
-  Cluster cluster;
-  if (n == 0) {
-    return cluster;
-  }
   const auto heaviest = static_cast<std::size_t>(std::max_element(mass.begin(), mass.end()) - mass.begin());
-  cluster.mass = mass[heaviest];
-  Vector3<double> centre = Vector3<double>::Zero();
-  double volume = 0.0;
+  std::vector<std::size_t> members;
   for (std::size_t i = 0; i < n; ++i) {
     if (root(i) == heaviest) {
-      const auto body = space.body(i);
-      ++cluster.bodies;
-      centre += body.mass() * body.position();
-      volume += 4.0 / 3.0 * pi<double>() * std::pow(body.radius(), 3);
+      members.push_back(i);
     }
+  }
+  return members;
+}
+
+}  // namespace
+
+Cluster largestCluster(const Space<double>& space) {
+  const std::vector<std::size_t> members = heaviestCluster(space);
+  Cluster cluster;
+  cluster.bodies = members.size();
+  Vector3<double> centre = Vector3<double>::Zero(), drift = Vector3<double>::Zero();
+  double volume = 0.0;
+  for (const std::size_t i : members) {
+    const auto body = space.body(i);
+    cluster.mass += body.mass();
+    centre += body.mass() * body.position();
+    drift += body.mass() * body.velocity();
+    volume += 4.0 / 3.0 * pi<double>() * std::pow(body.radius(), 3);
   }
   if (!(cluster.mass > 0.0)) {
     return cluster;
   }
   centre /= cluster.mass;
-  // Second moments: a homogeneous ellipsoid of half-axes a has M a^2 / 5 along each; so has a sphere of its
-  // own.
+  drift /= cluster.mass;
+
+  // Second moments sum m x x^T, each sphere with its own m r^2 / 5 along each axis, as an ellipsoid of
+  // half-axes a has M a^2 / 5.
+  const Matrix3<double> one = Matrix3<double>::Identity();
   Matrix3<double> moments = Matrix3<double>::Zero();
-  for (std::size_t i = 0; i < n; ++i) {
-    if (root(i) == heaviest) {
-      const auto body = space.body(i);
-      const Vector3<double> x = body.position() - centre;
-      moments += body.mass() *
-                 (x * x.transpose() + Matrix3<double>::Identity() * (body.radius() * body.radius() / 5.0));
-    }
+  Vector3<double> angularMomentum = Vector3<double>::Zero();
+  for (const std::size_t i : members) {
+    const auto body = space.body(i);
+    const Vector3<double> x = body.position() - centre;
+    const Vector3<double> v = body.velocity() - drift;
+    moments += body.mass() * (x * x.transpose() + one * (body.radius() * body.radius() / 5.0));
+    angularMomentum += body.mass() * x.cross(v) + body.inertia() * body.angularVelocity();
   }
   const Eigen::SelfAdjointEigenSolver<Matrix3<double>> solver(moments / cluster.mass, Eigen::EigenvaluesOnly);
   const Vector3<double> halfAxes = (5.0 * solver.eigenvalues().cwiseMax(0.0)).cwiseSqrt();
   cluster.axes = 2.0 * halfAxes.reverse();
-  const double space3 = 4.0 / 3.0 * pi<double>() * halfAxes.prod();
-  cluster.filling = space3 > 0.0 ? volume / space3 : 0.0;
+  const double enclosed = 4.0 / 3.0 * pi<double>() * halfAxes.prod();
+  cluster.filling = enclosed > 0.0 ? volume / enclosed : 0.0;
+
+  const Matrix3<double> inertia = one * moments.trace() - moments;
+  const Vector3<double> spin = inertia.ldlt().solve(angularMomentum);
+  cluster.angularSpeed = spin.norm();
+  for (const std::size_t i : members) {
+    const auto body = space.body(i);
+    const Vector3<double> v = body.velocity() - drift - spin.cross(body.position() - centre);
+    const Vector3<double> w = body.angularVelocity() - spin;
+    cluster.internalMotion += 0.5 * (body.mass() * v.squaredNorm() + body.inertia() * w.squaredNorm());
+  }
   return cluster;
 }
 

@@ -41,9 +41,11 @@ class Diagnostics {
 struct Cluster {
   std::size_t bodies = 0;
   double mass = 0.0;
-  Vector3<double> axes =
-      Vector3<double>::Zero();  ///< of the homogeneous ellipsoid of equal moments, longest first
+  /// Of the homogeneous ellipsoid of equal moments, longest first.
+  Vector3<double> axes = Vector3<double>::Zero();
   double filling = 0.0;         ///< volume of its bodies over that of the ellipsoid
+  double angularSpeed = 0.0;    ///< of the rigid body with its angular momentum
+  double internalMotion = 0.0;  ///< kinetic energy of its bodies against that rigid body
 };
 
 /// The heaviest cluster of the last step's contacts.

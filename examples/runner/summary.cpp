@@ -42,14 +42,19 @@ void addContacts(std::string& text, const Scene& scene, const Space<double>& spa
     return;
   }
   const Cluster pile = largestCluster(space);
-  const double mass = space.conserved().mass;
   if (pile.bodies >= 10) {
     text +=
         format("The largest pile holds %zu of %zu bodies and %s of the mass; it measures about %s x %s x %s",
-               pile.bodies, n, percent(pile.mass / mass).c_str(),
+               pile.bodies, n, percent(pile.mass / space.conserved().mass).c_str(),
                sceneLength(pile.axes[0], scene.units).c_str(), sceneLength(pile.axes[1], scene.units).c_str(),
                sceneLength(pile.axes[2], scene.units).c_str()) +
-        format(" and rock fills %.0f %% of it.\n", 100.0 * pile.filling);
+        format(", and its bodies fill %.0f %% of that.\n", 100.0 * pile.filling);
+    const double left = pile.internalMotion / history.peakMotion;
+    if (pile.angularSpeed > 0.0) {
+      text += "It turns once in " + sceneTime(2.0 * pi<double>() / pile.angularSpeed, scene.units) +
+              (left < 1e-4 ? " and has come to rest otherwise" : " and its bodies still move") +
+              format(": their motion against each other holds %.1e of the most kinetic energy seen.\n", left);
+    }
   }
 }
 
@@ -110,8 +115,9 @@ void addEnergy(std::string& text, const History& h) {
   }
   if (h.peakMotion > 0.0) {
     const double left = motion / h.peakMotion;
-    text += left < 1e-4 ? format("It has come to rest: %.1e of the most kinetic energy is left.\n", left)
-                        : format("It still moves: %.2g of the most kinetic energy is left.\n", left);
+    text += format(left < 1e-4 ? "All has come to rest: %.1e of the most kinetic energy seen is left.\n"
+                               : "%.2g of the most kinetic energy seen is left.\n",
+                   left);
   }
   text += format("The energy ledger is off by %.1e of the energy in play at the end, %.1e at most.\n",
                  std::abs(h.drift()), h.worstDrift);
