@@ -179,7 +179,7 @@ class ContactProblem {
       }
       b.inverseMass = movable ? S(source.masses()[i]) : S(0);  // the mass, until its scale is known
       b.spin = movable && r > S(0) && k > S(0) ? S(1) / k : S(0);
-      fastest = std::max<S>(fastest, std::max<S>(b.v.cwiseAbs().maxCoeff(), b.s.cwiseAbs().maxCoeff()));
+      fastest = std::max<S>(fastest, std::max<S>(detail::maxAbs(b.v), detail::maxAbs(b.s)));
       if (movable) {
         heaviest = std::max<S>(heaviest, b.inverseMass);
         lightest = lightest > S(0) ? std::min<S>(lightest, b.inverseMass) : b.inverseMass;
@@ -229,12 +229,15 @@ class ContactProblem {
     const S threshold = speedIn(settings.restitutionThreshold + S(2) * relativeAcceleration(c, source) * dt);
     const S allowed =
         c.gap > S(0) ? (dt > S(0) ? speedIn(c.gap / dt) : Eigen::NumTraits<S>::highest()) : S(0);
-    const bool impact = -v_n > threshold && -v_n > allowed;
-    row.impact = impact;
-    // A contact that separates may come to approach as fast, pushed by others, and bounces in the next step:
-    // J_n (v_n^- + v_n^+) <= 0 for every contact, so no choice of restitutions makes energy (see
-    // contact_energy.hpp).
-    row.target = impact ? -restitutionAt(c.material, S(-v_n)) * v_n : -std::max<S>(allowed, v_n);
+    const S speed = v_n < S(0) ? S(-v_n) : v_n;
+    const bool impact = v_n < S(0) && speed > threshold && speed > allowed;
+    row.impact = impact;  // booked otherwise than what rests, by who integrates in time
+    const bool parts = v_n > S(0) && speed > threshold;
+    // Newton's law for every contact that gets an impulse (Moreau 1988): v_n^+ = -e v_n^-. One that parts and
+    // is pushed back by others may so come to approach, and bounces in its turn in the next step; to stop it
+    // here would make energy: J_n (v_n^- + v_n^+) > 0.
+    row.target = impact || parts ? -restitutionAt(c.material, speed) * v_n : S(0);
+    row.target = impact ? row.target : std::min<S>(row.target, -allowed);
     row.target -= drift_n;
     row.slipTarget = drift_n * row.n - drift;
     if (friction && impact && c.material.tangentialRestitution > S(0)) {

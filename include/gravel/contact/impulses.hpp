@@ -18,6 +18,17 @@ namespace gravel {
 
 namespace detail {
 
+/// Largest |coefficient|; from comparisons alone, since a user's scalar need not have abs().
+template <Real Scalar>
+Scalar maxAbs(const Vector3<Scalar>& v) {
+  Scalar largest(0);
+  for (int c = 0; c < 3; ++c) {
+    const Scalar size = v[c] < Scalar(0) ? Scalar(-v[c]) : Scalar(v[c]);
+    largest = size <= largest ? largest : size;  // keeps a NaN
+  }
+  return largest;
+}
+
 /// |v| without overflow or underflow of the squares.
 template <Real Scalar>
 Scalar safeNorm(const Vector3<Scalar>& v) {
@@ -26,7 +37,7 @@ Scalar safeNorm(const Vector3<Scalar>& v) {
   if constexpr (std::is_floating_point_v<Scalar>) {
     constexpr Scalar tiny = std::numeric_limits<Scalar>::min() / std::numeric_limits<Scalar>::epsilon();
     if (!(sq > tiny) || !(sq < std::numeric_limits<Scalar>::max())) {
-      const Scalar largest = v.cwiseAbs().maxCoeff();
+      const Scalar largest = maxAbs(v);
       if (!(largest > Scalar(0)) || !std::isfinite(largest)) {
         return largest;
       }
@@ -51,7 +62,7 @@ Vector3<Scalar> safeUnit(const Vector3<Scalar>& v) {
     if (length < std::numeric_limits<Scalar>::min() / std::numeric_limits<Scalar>::epsilon() ||
         !std::isfinite(length)) {  // v / length would lose digits: bring it to order one first
       int exponent = 0;
-      (void)std::frexp(v.cwiseAbs().maxCoeff(), &exponent);
+      (void)std::frexp(maxAbs(v), &exponent);
       const Vector3<Scalar> scaled(std::ldexp(v[0], -exponent), std::ldexp(v[1], -exponent),
                                    std::ldexp(v[2], -exponent));
       return scaled / std::sqrt(scaled.squaredNorm());

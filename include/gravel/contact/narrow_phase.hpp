@@ -18,6 +18,11 @@ struct NarrowPhaseSettings {
   Scalar time = Scalar(0);     ///< [s], for a sheared domain
   Scalar epsilon = Scalar(0);  ///< [m] centres closer than this (and than rounding) count as one point
   Scalar margin = Scalar(0);   ///< [m] pairs with a gap below this are contacts too; 0 takes overlaps only
+  /// [s] step, or 0. What rests on something is carried through a step with a gap that opens and closes by
+  /// rounding and by the curvature of its path; it stays a contact while the accelerations of the two can
+  /// close the gap within the step, gap < (|a_1| + |a_2|) step^2, and the gap is below a thousandth of the
+  /// radii. Such a contact may approach until its gap is closed.
+  Scalar step = Scalar(0);
 };
 
 /// Turns candidate pairs and boundaries into the list of contacts, sorted by keys. Keeps its workspace from
@@ -52,6 +57,9 @@ class NarrowPhase {
     std::inplace_merge(out.begin(), out.begin() + pairContacts, out.end(), before);
   }
 
+  /// The largest gap of a resting contact over the sum of the radii.
+  static S restingMargin() { return S(1) / S(1000); }
+
  private:
   static constexpr std::size_t chunk = 4096;
 
@@ -80,6 +88,21 @@ class NarrowPhase {
     }
   }
 
+  template <class B>
+  static S accelerationOf(const B& bodies, std::size_t i) {
+    return detail::isMovable(bodies, i) ? detail::safeNorm(Vector3<S>(bodies.accelerations()[i])) : S(0);
+  }
+
+  /// \param acceleration() is asked for only where a step is given
+  template <class Acceleration>
+  static S marginOf(const NarrowPhaseSettings<S>& settings, const S& radii, Acceleration&& acceleration) {
+    if (!(settings.step > S(0))) {
+      return settings.margin;
+    }
+    const S closing = acceleration() * settings.step * settings.step;
+    return std::max<S>(settings.margin, std::min<S>(closing, restingMargin() * radii));
+  }
+
   static const Material<S>& surface(std::span<const Material<S>> materials, std::uint32_t id) {
     if (id >= materials.size()) {
       detail::refuse("material of a body", std::to_string(id),
@@ -99,13 +122,15 @@ class NarrowPhase {
     Vector3<S> r_ij = Vector3<S>(bodies.positions()[j]) - Vector3<S>(bodies.positions()[i]);
     Vector3<S> drift = Vector3<S>::Zero();
     domain.minimumImage(r_ij, drift, settings.time);
-    const S reach = r_i + r_j + settings.margin;
-    if (r_ij.cwiseAbs().maxCoeff() > reach) {
+    const S margin = marginOf(settings, r_i + r_j,
+                              [&] { return S(accelerationOf(bodies, i) + accelerationOf(bodies, j)); });
+    const S reach = r_i + r_j + margin;
+    if (detail::maxAbs(r_ij) > reach) {
       return;  // the common case, before anything else is loaded
     }
     const std::uint64_t id_i = bodies.ids()[i];
     const std::uint64_t id_j = bodies.ids()[j];
-    const auto touch = sphereSphere<S>(r_ij, r_i, r_j, id_i, id_j, settings.epsilon, settings.margin);
+    const auto touch = sphereSphere<S>(r_ij, r_i, r_j, id_i, id_j, settings.epsilon, margin);
     if (!touch || detail::isTracer(bodies, i) || detail::isTracer(bodies, j) ||
         !(detail::isMovable(bodies, i) || detail::isMovable(bodies, j))) {
       return;
@@ -124,8 +149,9 @@ class NarrowPhase {
     const S radius = bodies.radii()[i];
     for (std::size_t b = 0; b < boundaries.size(); ++b) {
       const HalfSpace<S>& wall = boundaries[b];
-      const auto touch = sphereHalfSpace<S>(Vector3<S>(bodies.positions()[i]), radius, wall.normal,
-                                            wall.offset, settings.margin);
+      const S margin = marginOf(settings, radius, [&] { return accelerationOf(bodies, i); });
+      const auto touch =
+          sphereHalfSpace<S>(Vector3<S>(bodies.positions()[i]), radius, wall.normal, wall.offset, margin);
       if (touch && detail::isMovable(bodies, i)) {
         part.push_back(Contact<S>{static_cast<std::uint32_t>(i), staticPartner, bodies.ids()[i],
                                   boundaryKey(b), touch->normal, touch->gap, touch->arm1, touch->arm2,

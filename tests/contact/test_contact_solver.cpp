@@ -1,0 +1,580 @@
+// Many contacts together.
+
+#include "scenes.hpp"
+#include "support/archetypes.hpp"
+#include "support/catch.hpp"
+
+#include <omp.h>
+
+#include <cstring>
+
+using namespace gravel;
+using namespace gravel::test;
+
+namespace {
+
+class Threads {
+ public:
+  explicit Threads(int n) : before_(omp_get_max_threads()) { omp_set_num_threads(n); }
+  ~Threads() { omp_set_num_threads(before_); }
+  Threads(const Threads&) = delete;
+  Threads& operator=(const Threads&) = delete;
+
+ private:
+  int before_;
+};
+
+/// Contacts that a random material was drawn for, each its own.
+template <class S, class B>
+std::vector<Contact<S>> mixedContacts(const B& bodies, const CounterRandom& random) {
+  std::vector<Contact<S>> contacts = contactsOf<S>(bodies, Material<S>{});
+  std::uint64_t counter = 0;
+  for (Contact<S>& c : contacts) {
+    c.material = randomMaterial<S>(random, counter);
+  }
+  return contacts;
+}
+
+template <class S>
+S normalVelocity(const Contact<S>& c, const Bodies<S, SoA>& bodies) {
+  const Vector3<S> v1 = bodies[c.first].velocity();
+  const Vector3<S> v2 =
+      c.second == staticPartner ? Vector3<S>(Vector3<S>::Zero()) : Vector3<S>(bodies[c.second].velocity());
+  return c.normal.dot(v2 - v1);
+}
+
+template <class S>
+Vector3<S> slipOf(const Contact<S>& c, const Bodies<S, SoA>& bodies) {
+  const Vector3<S> v1 = bodies[c.first].velocity();
+  const Vector3<S> w1 = bodies[c.first].angularVelocity();
+  const Vector3<S> v2 = bodies[c.second].velocity();
+  const Vector3<S> w2 = bodies[c.second].angularVelocity();
+  const Vector3<S> u = v2 - v1 - (c.arm1 * w1 + c.arm2 * w2).cross(c.normal);
+  return u - c.normal.dot(u) * c.normal;
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("a column of ten: from nothing, at default settings, each contact carries what lies on it",
+                   "", float, double, long double) {
+  using S = TestType;
+  const S g = static_cast<S>(9.81);
+  const S dt = static_cast<S>(1e-3);
+  Bodies<S, SoA> bodies = column<S>(10, 1e-4, g, dt);
+  const auto contacts = contactsOf(bodies, Material<S>{}, floorAtZero<S>());
+  REQUIRE(contacts.size() == 10);
+  ContactSolver<S> solver;
+  const ContactReport<S> report = solver.solve(contacts, bodies, dt);
+  CHECK(report.colours == 2);
+  for (std::size_t k = 0; k < 10; ++k) {
+    // key1 is the lower body: under it lie as many as its id says, the floor's contact has them all.
+    const bool onFloor = contacts[k].second == staticPartner;
+    const double carried = onFloor ? 10.0 : 9.0 - static_cast<double>(contacts[k].key1);
+    CHECK_THAT(static_cast<double>(solver.impulses()[k].normal / (g * dt)), WithinRel(carried, 1e-3));
+    CHECK(solver.impulses()[k].tangential.norm() <= S(4) * eps<S> * solver.impulses()[k].normal);
+  }
+  // Without momentum 100 sweeps leave an error of 11 percent.
+  Bodies<S, SoA> plain = column<S>(10, 1e-4, g, dt);
+  ContactSolver<S> slow;
+  ContactSettings<S> settings;
+  settings.accelerate = false;
+  slow.setSettings(settings);
+  CHECK(slow.solve(contacts, plain, dt).residual > S(100) * report.residual);
+}
+
+TEST_CASE("a column of ten under gravity comes to rest: no drift, no creep, right weight from step to step") {
+  const double g = 9.81;
+  const double dt = 1e-3;
+  Bodies<double, SoA> bodies = column<double>(10, 1e-4, g, dt);
+  ContactSolver<double> solver;
+  CorrectionSettings<double> correction;
+  correction.factor = 0.2;
+  double energy = 0.0;
+  double mean = 0.0;
+  for (int step = 0; step < 3000; ++step) {
+    const auto contacts = contactsOf(bodies, Material<double>{}, floorAtZero<double>(), 1e-3);
+    REQUIRE(contacts.size() == 10);
+    solver.solve(contacts, bodies, dt);
+    energy = static_cast<double>(Totals(bodies).energy);
+    mean += step >= 2000 ? solver.impulses()[0].normal / 1000.0 : 0.0;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      bodies[i].position() += dt * bodies[i].velocity();
+      bodies[i].velocity()[2] -= g * dt;
+    }
+    solver.correctPositions(bodies, correction);
+  }
+  CHECK(energy < 1e-12 * 10 * g * 0.5);
+  CHECK_THAT(mean, WithinRel(9.0 * g * dt, 1e-3));
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    CHECK(std::hypot(bodies[i].position()[0], bodies[i].position()[1]) < 1e-9 * 0.5);
+    // As high as a column without overlap, within 1e-3 of a radius.
+    CHECK_THAT(bodies[i].position()[2], WithinAbs(0.5 + static_cast<double>(i), 0.5e-3));
+  }
+}
+
+TEMPLATE_TEST_CASE("a dense crowd: momentum, angular momentum, energy, ledger and cone", "", float, double,
+                   long double) {
+  using S = TestType;
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    Bodies<S, SoA> bodies = randomCloud<S>(200, 5.5, seed);
+    const CounterRandom random(seed, 5);
+    const auto contacts = mixedContacts<S>(bodies, random);
+    REQUIRE(contacts.size() > 300);
+    const Totals before(bodies);
+    ContactSolver<S> solver;
+    const ContactReport<S> report = solver.solve(contacts, bodies, S(0.01));
+    const Totals after(bodies);
+    // Each of some 100 sweeps rounds once; errors of either sign.
+    const Wide rounding = 64 * Wide(eps<S>);
+    CHECK((after.momentum - before.momentum).norm() <= rounding * before.momentumScale);
+    CHECK((after.angular - before.angular).norm() <= rounding * before.angularScale);
+    CHECK(after.energy <= before.energy * (1 + rounding));
+    const Wide lost = Wide(report.restitutionLoss) + Wide(report.frictionLoss);
+    CHECK(lost > 0.01 * before.energy);
+    CHECK(std::abs(before.energy - after.energy - lost) <= rounding * before.energy);
+    CHECK(report.driftWork == S(0));
+    S largest(0);
+    for (const ContactImpulse<S>& j : solver.impulses()) {
+      largest = std::max(largest, j.normal);
+    }
+    for (std::size_t k = 0; k < contacts.size(); ++k) {
+      const ContactImpulse<S>& j = solver.impulses()[k];
+      CHECK(j.normal >= S(0));
+      CHECK(j.tangential.norm() <= contacts[k].material.staticFriction * j.normal * (S(1) + S(16) * eps<S>));
+      CHECK(std::abs(j.tangential.dot(contacts[k].normal)) <=
+            S(4 * report.iterations) * eps<S> * largest);  // a rounding or two a sweep
+    }
+  }
+}
+
+TEST_CASE("a frictional crowd solved to the end obeys Coulomb: sliding contacts are at the kinetic limit") {
+  Bodies<double, SoA> bodies = randomCloud<double>(150, 5.0, 3);
+  const Material<double> material{0.0, 0.5, 0.3, 0.0};
+  const auto contacts = contactsOf(bodies, material);
+  ContactSolver<double> solver;
+  ContactSettings<double> settings;
+  settings.tolerance = 1e-12;
+  settings.maxIterations = 20000;
+  solver.setSettings(settings);
+  const ContactReport<double> report = solver.solve(contacts, bodies, 0.01);
+  REQUIRE(report.residual <= 1e-12);
+  int sliding = 0;
+  int sticking = 0;
+  int open = 0;
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    const ContactImpulse<double>& j = solver.impulses()[k];
+    const double v_n = normalVelocity(contacts[k], bodies);
+    const Vector3<double> slip = slipOf(contacts[k], bodies);
+    // Velocities are right to the tolerance times the sweeps that a disturbance lives for.
+    CHECK(v_n > -1e-9);
+    if (j.normal == 0.0) {
+      ++open;
+      continue;
+    }
+    CHECK(v_n < 1e-9);
+    if (slip.norm() > 1e-8) {
+      ++sliding;
+      CHECK_THAT(j.tangential.norm(), WithinRel(0.3 * j.normal, 1e-9));
+      CHECK(j.tangential.normalized().dot(slip.normalized()) < -1.0 + 1e-6);
+    } else {
+      ++sticking;
+      CHECK(j.tangential.norm() <= 0.5 * j.normal * (1 + 1e-12));
+    }
+  }
+  CHECK(sliding > 20);
+  CHECK(sticking > 20);
+  CHECK(open > 20);
+}
+
+TEST_CASE("same bits for 1, 2, 3 and 8 threads, and whatever the indices of the bodies") {
+  const std::size_t n = 6000;
+  const Bodies<double, SoA> start = randomCloud<double>(n, 15.0, 9);
+  std::vector<Pair> pairs;
+  // A sweep along x, since all pairs of 6000 are many.
+  std::vector<std::uint32_t> order(n);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    order[i] = i;
+  }
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return start[a].position()[0] < start[b].position()[0];
+  });
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = i + 1; j < n && start[order[j]].position()[0] < start[order[i]].position()[0] + 1.2;
+         ++j) {
+      pairs.push_back({std::min(order[i], order[j]), std::max(order[i], order[j])});
+    }
+  }
+  std::sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) {
+    return a.first != b.first ? a.first < b.first : a.second < b.second;
+  });
+  const std::vector<Material<double>> materials{{0.5, 0.5, 0.4, 0.2}};
+  const auto run = [&](Bodies<double, SoA>& bodies, const std::vector<Pair>& candidates) {
+    std::vector<Contact<double>> contacts;
+    NarrowPhase<double>().find(candidates, bodies, Domain<double>::open(), materials, floorAtZero<double>(),
+                               {}, contacts);
+
+    ContactSolver<double> solver;
+    ContactSettings<double> settings;
+    settings.maxIterations = 4;
+    solver.setSettings(settings);
+    solver.solve(contacts, bodies, 0.01);
+    REQUIRE(solver.coloring().end(0) - solver.coloring().begin(0) > 2048);  // large enough to be shared
+    solver.solve(contacts, bodies, 0.01);
+    solver.correctPositions(bodies, {});
+  };
+  Bodies<double, SoA> one = start;
+  {
+    const Threads threads(1);
+    run(one, pairs);
+  }
+  const auto same = [&](const Bodies<double, SoA>& other) {
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::size_t k = other.indexOf(one[i].id());
+      if (Vector3<double>(one[i].velocity()) != Vector3<double>(other[k].velocity()) ||
+          Vector3<double>(one[i].angularVelocity()) != Vector3<double>(other[k].angularVelocity()) ||
+          Vector3<double>(one[i].position()) != Vector3<double>(other[k].position())) {
+        return false;
+      }
+    }
+    return true;
+  };
+  for (const int count : {2, 3, 8}) {
+    const Threads threads(count);
+    Bodies<double, SoA> many = start;
+    run(many, pairs);
+    CHECK(same(many));
+  }
+  // Indices shuffled, ids kept.
+  Bodies<double, SoA> shuffled = start;
+  std::vector<std::size_t> permutation(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    permutation[i] = (i * 7919 + 13) % n;  // 7919 is prime to n
+  }
+  shuffled.reorder(permutation);
+  std::vector<std::uint32_t> place(n);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    place[permutation[i]] = i;
+  }
+  std::vector<Pair> moved = pairs;
+  for (Pair& pair : moved) {
+    pair = {place[pair.first], place[pair.second]};
+  }
+  run(shuffled, moved);
+  CHECK(same(shuffled));
+}
+
+TEST_CASE("a contact apart from the rest is exact after its one blow, in the middle of a crowd's problem") {
+  Bodies<double, SoA> crowd = column<double>(10, 1e-4, 9.81, 1e-3);
+  Body<double> ball;
+  ball.radius = 0.5;
+  ball.position = {10, 0, 5};
+  ball.velocity = {1, 2, 3};
+  crowd.add(ball);
+  ball.position = {10.9, 0, 5};
+  ball.velocity = {-2, 0, 1};
+  ball.mass = 3;
+  crowd.add(ball);
+  Bodies<double, SoA> alone;
+  alone.add(crowd[10].load());
+  alone.add(crowd[11].load());
+  const Material<double> material{0.7, 0.3, 0.2, 0.1};
+  ContactSolver<double>().solve(contactsOf(crowd, material, floorAtZero<double>()), crowd, 1e-3);
+  ContactSolver<double>().solve(contactsOf(alone, material), alone, 1e-3);
+  for (std::size_t i = 0; i < 2; ++i) {
+    CHECK(Vector3<double>(crowd[10 + i].velocity()) == Vector3<double>(alone[i].velocity()));
+    CHECK(Vector3<double>(crowd[10 + i].angularVelocity()) == Vector3<double>(alone[i].angularVelocity()));
+  }
+}
+
+TEST_CASE("without friction no spin is touched, to the bit") {
+  Bodies<double, SoA> bodies = randomCloud<double>(100, 4.0, 1);
+  const Bodies<double, SoA> before = bodies;
+  const auto contacts = contactsOf(bodies, Material<double>{0.5, 0.0, 0.0, 0.0});
+  const ContactReport<double> report = ContactSolver<double>().solve(contacts, bodies, 0.01);
+  CHECK(report.iterations > 1);
+  CHECK(report.frictionLoss == 0.0);
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    CHECK(Vector3<double>(bodies[i].angularVelocity()) == Vector3<double>(before[i].angularVelocity()));
+  }
+}
+
+TEST_CASE("a warm start needs fewer sweeps for the same answer, and a restart with it the same bits") {
+  const double dt = 1e-3;
+  const auto kick = [&](Bodies<double, SoA>& bodies) {
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      bodies[i].velocity()[2] -= 9.81 * dt;
+    }
+  };
+  Bodies<double, SoA> bodies = column<double>(10, 1e-4, 9.81, dt);
+  const auto contacts = contactsOf(bodies, Material<double>{}, floorAtZero<double>());
+  ContactSolver<double> solver;
+  const int cold = solver.solve(contacts, bodies, dt).iterations;
+  kick(bodies);
+  Bodies<double, SoA> again = bodies;
+  Bodies<double, SoA> fresh = bodies;
+  ContactSolver<double> restarted;
+  restarted.setMemory(solver.memory(), solver.memoryStep());
+  const int warm = solver.solve(contacts, bodies, dt).iterations;
+  CHECK(warm * 2 < cold);
+  restarted.solve(contacts, again, dt);
+  CHECK(restarted.memory() == solver.memory());
+  solver.forget();
+  solver.solve(contacts, fresh, dt);
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    CHECK(Vector3<double>(bodies[i].velocity()) == Vector3<double>(again[i].velocity()));
+    CHECK((bodies[i].velocity() - fresh[i].velocity()).norm() < 1e-4 * 9.81 * dt);
+  }
+}
+
+TEST_CASE("a heavy body on a light one, and a light one on a heavy one: mass ratio 1e9") {
+  for (const double top : {1e9, 1e-9}) {
+    Bodies<double, SoA> bodies = column<double>(2, 1e-6, 9.81, 1e-3);
+    bodies[1].mass() = top;
+    ContactSolver<double> solver;
+    ContactSettings<double> settings;
+    settings.maxIterations = 100000;
+    settings.tolerance = 1e-9;
+    solver.setSettings(settings);
+    const auto contacts = contactsOf(bodies, Material<double>{}, floorAtZero<double>());
+    for (int step = 0; step < 50; ++step) {  // the warm start carries on where a step ends
+      solver.solve(contacts, bodies, 1e-3);
+      for (std::size_t i = 0; i < 2; ++i) {
+        bodies[i].velocity()[2] -= 9.81e-3;
+      }
+    }
+    const double g_dt = 9.81e-3;
+    CHECK_THAT(solver.impulses()[0].normal, WithinRel(top * g_dt, 1e-6));
+    CHECK_THAT(solver.impulses()[1].normal, WithinRel((1 + top) * g_dt, 1e-6));
+  }
+}
+
+TEST_CASE("a blow of mass ratio 1e9 is the closed form to 1e-14") {
+  Bodies<double, SoA> bodies;
+  Body<double> ball;
+  ball.radius = 1;
+  ball.mass = 1e9;
+  ball.velocity = {1, 0, 0};
+  bodies.add(ball);
+  ball.mass = 1;
+  ball.velocity = {-2, 0, 0};
+  ball.position = {1.999, 0, 0};
+  bodies.add(ball);
+  ContactSolver<double>().solve(contactsOf(bodies, Material<double>{1, 0, 0, 0}), bodies, 1.0);
+  CHECK_THAT(bodies[1].velocity()[0], WithinRel(-2.0 + 2.0 * 3.0 * 1e9 / (1e9 + 1.0), 1e-14));
+  CHECK_THAT(bodies[0].velocity()[0] - 1.0, WithinAbs(-2.0 * 3.0 / (1e9 + 1.0), 2.3e-16));
+}
+
+TEST_CASE("tiny numbers: speeds of 1e-310 and masses of 1e-300 obey the same laws") {
+  Bodies<double, SoA> bodies;
+  Bodies<double, SoA> ordinary;
+  const CounterRandom random(5);
+  std::uint64_t counter = 0;
+  const double tiny = 0x1p-1000;
+  for (int i = 0; i < 30; ++i) {
+    Body<double> body = randomBody<double>(random, counter);
+    body.radius = 0.5;
+    for (int c = 0; c < 3; ++c) {
+      body.position[c] = random.uniform(counter++, -1.2, 1.2);
+    }
+    ordinary.add(body);
+    body.mass *= 0x1p-997;  // 1e-300
+    body.velocity *= tiny;
+    body.angularVelocity *= tiny;
+    bodies.add(body);
+  }
+  const Material<double> material{0.5, 0.4, 0.3, 0.2};
+  ContactSolver<double>().solve(contactsOf(bodies, material), bodies, 0.01);
+  ContactSolver<double>().solve(contactsOf(ordinary, material), ordinary, 0.01);
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const Vector3<double> v = bodies[i].velocity();
+    // Powers of two: the same bits but for the order in which rounding meets the scale of masses.
+    CHECK((v / tiny - ordinary[i].velocity()).norm() <= 1e-12 * (1.0 + ordinary[i].velocity().norm()));
+    CHECK((bodies[i].angularVelocity() / tiny - ordinary[i].angularVelocity()).norm() <= 1e-11);
+  }
+  Bodies<double, SoA> pair;
+  Body<double> dust;
+  dust.mass = 1e-300;
+  dust.radius = 1e-7;
+  dust.velocity = {3e-310, 0, 0};
+  pair.add(dust);
+  dust.position = {1.9e-7, 0, 0};
+  dust.velocity = {-3e-310, 0, 0};
+  pair.add(dust);
+  ContactSolver<double>().solve(contactsOf(pair, Material<double>{1, 0.5, 0.5, 0}), pair, 1.0);
+  CHECK_THAT(pair[0].velocity()[0], WithinRel(-3e-310, 1e-12));
+  CHECK_THAT(pair[1].velocity()[0], WithinRel(3e-310, 1e-12));
+}
+
+TEST_CASE("a resting contact does not bounce on what gravity gives it in a step; a faster one does") {
+  const double g = 9.81;
+  const double dt = 1e-2;
+  for (const double speed : {1.0, 3.0}) {  // in units of g dt; the threshold is 2
+    Bodies<double, SoA> bodies = column<double>(1, 1e-6, g, dt);
+    bodies[0].velocity()[2] = -speed * g * dt;
+    ContactSolver<double>().solve(contactsOf(bodies, Material<double>{0.5, 0, 0, 0}, floorAtZero<double>()),
+                                  bodies, dt);
+    CHECK(bodies[0].velocity()[2] == (speed > 2 ? 0.5 * speed * g * dt : 0.0));
+  }
+  Bodies<double, SoA> bodies = column<double>(1, 1e-6, 0.0, dt);
+  bodies[0].velocity()[2] = -0.4;
+  ContactSolver<double> solver;
+  ContactSettings<double> settings;
+  settings.restitutionThreshold = 0.5;
+  solver.setSettings(settings);
+  solver.solve(contactsOf(bodies, Material<double>{0.5, 0, 0, 0}, floorAtZero<double>()), bodies, dt);
+  CHECK(bodies[0].velocity()[2] == 0.0);
+}
+
+TEST_CASE("a contact seen before it closes lets a body come to the surface and no further") {
+  Bodies<double, SoA> bodies = column<double>(1, -1e-3, 0.0, 1.0);
+  bodies[0].velocity()[2] = -0.5;
+  const auto contacts = contactsOf(bodies, Material<double>{0, 0, 0, 0}, floorAtZero<double>(), 2e-3);
+  REQUIRE(contacts.size() == 1);
+  ContactSolver<double> solver;
+  ContactSettings<double> settings;
+  settings.restitutionThreshold = 1.0;
+  solver.setSettings(settings);
+  solver.solve(contacts, bodies, 0.01);
+  CHECK_THAT(bodies[0].velocity()[2], WithinRel(-0.1, 1e-12));  // 1e-3 m in 0.01 s
+  bodies[0].velocity()[2] = -0.05;
+  solver.solve(contacts, bodies, 0.01);
+  CHECK(bodies[0].velocity()[2] == -0.05);  // will not reach it in this step
+}
+
+TEST_CASE("a moving partner: friction carries along, and the drift's work closes the ledger") {
+  Bodies<double, SoA> bodies = column<double>(4, 1e-4, 9.81, 1e-2);
+  auto contacts = contactsOf(bodies, Material<double>{0.3, 0.5, 0.4, 0.0}, floorAtZero<double>());
+  for (Contact<double>& c : contacts) {
+    if (c.second == staticPartner) {
+      c.drift = {0.02, 0, 0.01};  // the floor moves
+    }
+  }
+  const double before = static_cast<double>(Totals(bodies).energy);
+  const ContactReport<double> report = ContactSolver<double>().solve(contacts, bodies, 1e-2);
+  const double after = static_cast<double>(Totals(bodies).energy);
+  CHECK(bodies[0].velocity()[0] > 1e-3);
+  CHECK_THAT(bodies[0].velocity()[2], WithinRel(0.01, 1e-3));
+  CHECK(report.driftWork > 0.0);
+  CHECK_THAT(after - before,
+             WithinRel(report.driftWork - report.restitutionLoss - report.frictionLoss, 1e-10));
+}
+
+TEST_CASE("all fixed, none, and one: no work and no crash; a body with a hundred partners is right too") {
+  Bodies<double, SoA> none;
+  ContactSolver<double> solver;
+  CHECK(solver.solve({}, none, 1.0).iterations == 0);
+  CHECK(solver.impulses().empty());
+  Bodies<double, SoA> bodies;
+  Body<double> hub;
+  hub.radius = 1;
+  bodies.add(hub);
+  const CounterRandom random(1);
+  for (std::uint64_t i = 0; i < 100; ++i) {  // more partners than colours
+    Body<double> ball;
+    ball.radius = 0.01;
+    ball.mass = 0.01;
+    ball.position = 1.009 * random.direction(i);
+    ball.velocity = -ball.position;
+    bodies.add(ball);
+  }
+  auto contacts = contactsOf(bodies, Material<double>{0, 0, 0, 0});
+  std::erase_if(contacts, [](const Contact<double>& c) { return c.key1 != 0; });
+  REQUIRE(contacts.size() == 100);
+  const Totals before(bodies);
+  ContactSettings<double> settings;
+  settings.tolerance = 1e-10;
+  settings.maxIterations = 1000;
+  solver.setSettings(settings);
+  const ContactReport<double> report = solver.solve(contacts, bodies, 1.0);
+  CHECK(report.residual <= 1e-10);
+  CHECK(solver.coloring().end(solver.coloring().colours()) -
+            solver.coloring().begin(solver.coloring().colours()) ==
+        100 - ContactColoring::maxColours);
+  for (const Contact<double>& c : contacts) {
+    CHECK(normalVelocity(c, bodies) > -1e-8);
+  }
+  CHECK((Totals(bodies).momentum - before.momentum).norm() < 1e-14L * before.momentumScale);
+}
+
+TEST_CASE("contacts of bodies that do not exist and settings out of range are refused") {
+  Bodies<double, SoA> bodies = column<double>(2, 1e-4, 1.0, 1.0);
+  auto contacts = contactsOf(bodies, Material<double>{});
+  ContactSolver<double> solver;
+  contacts[0].second = 7;
+  CHECK_THROWS_WITH(solver.solve(contacts, bodies, 1.0),
+                    ContainsSubstring("0, 7") && ContainsSubstring("below 2"));
+  contacts[0].second = contacts[0].first;
+  CHECK_THROWS_AS(solver.solve(contacts, bodies, 1.0), std::invalid_argument);
+  const auto with = [](auto change) {
+    ContactSettings<double> s;
+    change(s);
+    return s;
+  };
+  CHECK_THROWS_WITH(solver.setSettings(with([](auto& s) { s.tolerance = 0; })),
+                    ContainsSubstring("contact tolerance is 0"));
+  CHECK_THROWS_WITH(solver.setSettings(with([](auto& s) { s.maxIterations = 0; })),
+                    ContainsSubstring("maxIterations is 0"));
+  CHECK_THROWS_WITH(solver.setSettings(with([](auto& s) { s.restitutionThreshold = -1; })),
+                    ContainsSubstring("restitutionThreshold is -1"));
+}
+
+TEMPLATE_TEST_CASE("every layout, and a user's own arrays, give the same bits", "", SoA, AoS, AoSoA<8>) {
+  const Bodies<double, SoA> start = randomCloud<double>(60, 3.0, 4);
+  Bodies<double, SoA> reference = start;
+  Bodies<double, TestType> bodies;
+  std::vector<Vector3<double>> x, v, w, a;
+  std::vector<double> m, r, k;
+  std::vector<std::uint64_t> ids;
+  for (std::size_t i = 0; i < start.size(); ++i) {
+    bodies.add(start[i].load());
+    x.emplace_back(start[i].position());
+    v.emplace_back(start[i].velocity());
+    w.emplace_back(start[i].angularVelocity());
+    a.emplace_back(Vector3<double>::Zero());
+    m.push_back(start[i].mass());
+    r.push_back(start[i].radius());
+    k.push_back(start[i].inertiaFactor());
+    ids.push_back(i);
+  }
+  const std::vector<std::uint32_t> zeros(start.size(), 0);
+  ContactArrays<double> arrays{x, v, w, a, m, r, k, zeros, ids, zeros};
+  const Material<double> material{0.5, 0.5, 0.5, 0.5};
+  ContactSolver<double> solver;
+  solver.solve(contactsOf(reference, material), reference, 0.01);
+  ContactSolver<double>().solve(contactsOf(bodies, material), bodies, 0.01);
+  ContactSolver<double>().solve(contactsOf(arrays, material), arrays, 0.01);
+  for (std::size_t i = 0; i < start.size(); ++i) {
+    CHECK(Vector3<double>(bodies[i].velocity()) == Vector3<double>(reference[i].velocity()));
+    CHECK(v[i] == Vector3<double>(reference[i].velocity()));
+    CHECK(w[i] == Vector3<double>(reference[i].angularVelocity()));
+  }
+}
+
+TEST_CASE("the least that is a Real solves contacts with the numbers of double") {
+  using R = MinimalReal;
+  const Bodies<double, SoA> start = column<double>(5, 1e-4, 9.81, 1e-3);
+  Bodies<double, SoA> doubles = start;
+  Bodies<R, SoA> minimal;
+  for (std::size_t i = 0; i < start.size(); ++i) {
+    Body<R> body;
+    body.mass = R(start[i].mass());
+    body.radius = R(start[i].radius());
+    for (int c = 0; c < 3; ++c) {
+      body.position[c] = R(start[i].position()[c]);
+      body.velocity[c] = R(start[i].velocity()[c]);
+    }
+    minimal.add(body);
+    minimal.accelerations()[i] = Vector3<R>(R(0), R(0), R(-9.81));
+  }
+  ContactSolver<R> solver;
+  const auto contacts = contactsOf<R>(minimal, Material<R>{}, floorAtZero<R>());
+  solver.solve(contacts, minimal, R(1e-3));
+  CorrectionSettings<R> correction;
+  solver.correctPositions(minimal, correction);
+  ContactSolver<double>().solve(contactsOf(doubles, Material<double>{}, floorAtZero<double>()), doubles,
+                                1e-3);
+  for (std::size_t i = 0; i < start.size(); ++i) {
+    CHECK_THAT(minimal[i].velocity()[2].inTest(), WithinAbs(doubles[i].velocity()[2], 1e-15));
+    CHECK(minimal[i].position()[2].inTest() > start[i].position()[2]);
+  }
+}
