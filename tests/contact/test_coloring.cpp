@@ -1,0 +1,198 @@
+// Colours of graphs and of contacts.
+
+#include "scenes.hpp"
+#include "support/catch.hpp"
+#include <gravel/contact/graph_coloring.hpp>
+
+#include <omp.h>
+
+#include <set>
+
+using namespace gravel;
+using namespace gravel::test;
+
+namespace {
+
+using Graph = std::vector<std::vector<std::size_t>>;
+
+bool valid(const Graph& graph, const std::vector<int>& colour) {
+  if (colour.size() != graph.size()) {
+    return false;
+  }
+  for (std::size_t i = 0; i < graph.size(); ++i) {
+    for (const std::size_t j : graph[i]) {
+      if (colour[i] == colour[j] || colour[i] < 0) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+int coloursOf(const std::vector<int>& colour) {
+  return colour.empty() ? 0 : 1 + *std::max_element(colour.begin(), colour.end());
+}
+
+std::size_t largestDegree(const Graph& graph) {
+  std::vector<std::set<std::size_t>> both(graph.size());
+  for (std::size_t i = 0; i < graph.size(); ++i) {
+    for (const std::size_t j : graph[i]) {
+      both[i].insert(j);
+      both[j].insert(i);
+    }
+  }
+  std::size_t largest = 0;
+  for (const auto& neighbours : both) {
+    largest = std::max(largest, neighbours.size());
+  }
+  return largest;
+}
+
+Graph randomGraph(std::size_t n, double degree, std::uint64_t seed, bool bothWays) {
+  Graph graph(n);
+  const CounterRandom random(seed);
+  const auto edges = static_cast<std::uint64_t>(degree * static_cast<double>(n) / 2);
+  for (std::uint64_t e = 0; e < edges; ++e) {
+    const std::size_t i = random.bits(2 * e) % n;
+    const std::size_t j = random.bits(2 * e + 1) % n;
+    if (i != j) {
+      graph[i].push_back(j);
+      if (bothWays) {
+        graph[j].push_back(i);
+      }
+    }
+  }
+  return graph;
+}
+
+}  // namespace
+
+TEST_CASE("colorGraph: valid and within degree + 1 colours on random graphs, however edges are listed") {
+  for (std::uint64_t seed = 0; seed < 30; ++seed) {
+    const std::size_t n = 1 + static_cast<std::size_t>(seed * seed);
+    for (const double degree : {0.5, 3.0, 20.0}) {
+      for (const bool bothWays : {false, true}) {
+        const Graph graph = randomGraph(n, degree, seed, bothWays);
+        const std::vector<int> colour = colorGraph(graph);
+        CHECK(valid(graph, colour));
+        CHECK(static_cast<std::size_t>(coloursOf(colour)) <= largestDegree(graph) + 1);
+      }
+    }
+  }
+}
+
+TEST_CASE("colorGraph: complete graph, star, long path, cycle, no edges, nothing") {
+  Graph complete(60);
+  for (std::size_t i = 0; i < 60; ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      complete[i].push_back(j);
+    }
+  }
+  CHECK(valid(complete, colorGraph(complete)));
+  CHECK(coloursOf(colorGraph(complete)) == 60);
+  Graph star(10001);
+  for (std::size_t i = 1; i <= 10000; ++i) {
+    star[0].push_back(i);
+  }
+  CHECK(valid(star, colorGraph(star)));
+  CHECK(coloursOf(colorGraph(star)) == 2);
+  Graph path(100000);
+  for (std::size_t i = 1; i < path.size(); ++i) {
+    path[i].push_back(i - 1);
+  }
+  CHECK(valid(path, colorGraph(path)));
+  CHECK(coloursOf(colorGraph(path)) <= 3);
+  CHECK(colorGraph(Graph(7)) == std::vector<int>(7, 0));
+  CHECK(colorGraph({}).empty());
+}
+
+TEST_CASE("colorGraph: the same colours for 1, 2, 3 and 8 threads") {
+  const Graph graph = randomGraph(20000, 8.0, 4, false);
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const std::vector<int> one = colorGraph(graph);
+  for (const int threads : {2, 3, 8}) {
+    omp_set_num_threads(threads);
+    CHECK(colorGraph(graph) == one);
+  }
+  omp_set_num_threads(before);
+}
+
+TEST_CASE("colorGraph: self loops and strangers are refused by vertex") {
+  CHECK_THROWS_AS(colorGraph({{1}, {1}}), std::invalid_argument);
+  CHECK_THROWS_WITH(colorGraph({{1}, {0, 5}}),
+                    ContainsSubstring("neighbour of vertex 1 is 5") && ContainsSubstring("below 2"));
+}
+
+TEST_CASE("contacts of one colour share no movable body; lone ones share none with any") {
+  Bodies<double, SoA> bodies = randomCloud<double>(500, 7.0, 8);
+  for (std::size_t i = 0; i < 500; i += 10) {
+    bodies[i].setFixed(true);
+  }
+  const auto contacts = contactsOf<double>(bodies, Material<double>{}, {{{0, 0, 1}, -3, {}}});
+  ContactColoring coloring;
+  for (int again = 0; again < 2; ++again) {  // the workspace is left clean
+    coloring.build(std::span<const Contact<double>>(contacts), bodies);
+    REQUIRE(coloring.rows().size() == contacts.size());
+    std::vector<int> uses(bodies.size(), 0);
+    std::vector<bool> seen(contacts.size(), false);
+    for (const Contact<double>& c : contacts) {
+      ++uses[c.first];
+      uses[c.second == staticPartner ? c.first : c.second] += c.second == staticPartner ? 0 : 1;
+    }
+    const auto check = [&](std::size_t begin, std::size_t end) {
+      std::set<std::uint32_t> taken;
+      for (std::size_t k = begin; k < end; ++k) {
+        const ContactColoring::Row& row = coloring.rows()[k];
+        CHECK_FALSE(seen[row.contact]);
+        seen[row.contact] = true;
+        const Contact<double>& c = contacts[row.contact];
+        CHECK(coloring.bodies()[row.slot1] == c.first);
+        if (c.second == staticPartner) {
+          CHECK(row.slot2 == coloring.staticSlot());
+        } else {
+          CHECK(coloring.bodies()[row.slot2] == c.second);
+        }
+        for (const std::uint32_t body : {c.first, c.second}) {
+          if (body != staticPartner && !bodies[body].isFixed()) {
+            CHECK(taken.insert(body).second);
+          }
+        }
+      }
+    };
+    CHECK(coloring.loneCount() > 0);
+    check(0, coloring.loneCount());
+    for (std::size_t k = 0; k < coloring.loneCount(); ++k) {
+      const Contact<double>& c = contacts[coloring.rows()[k].contact];
+      CHECK((bodies[c.first].isFixed() || uses[c.first] == 1));
+      CHECK((c.second == staticPartner || bodies[c.second].isFixed() || uses[c.second] == 1));
+    }
+    for (std::size_t colour = 0; colour < coloring.colours(); ++colour) {
+      CHECK(coloring.begin(colour) < coloring.end(colour));
+      check(coloring.begin(colour), coloring.end(colour));
+    }
+    CHECK(coloring.begin(coloring.colours()) == contacts.size());  // no overflow here
+    CHECK(std::count(seen.begin(), seen.end(), true) == static_cast<std::ptrdiff_t>(contacts.size()));
+  }
+}
+
+TEST_CASE("all contacts of a fixed body with single grains are one group") {
+  Bodies<double, SoA> bodies;
+  Body<double> body;
+  body.radius = 1;
+  body.fixed = true;
+  bodies.add(body);
+  body.fixed = false;
+  body.radius = 0.01;
+  for (int i = 0; i < 200; ++i) {
+    bodies.add(body);
+  }
+  std::vector<Contact<double>> contacts;
+  for (std::uint32_t i = 1; i <= 200; ++i) {
+    contacts.push_back({0, i, 0, i, {1, 0, 0}, -1.0, 1.0, 0.0, {}, {0, 0, 0}});
+  }
+  ContactColoring coloring;
+  coloring.build(std::span<const Contact<double>>(contacts), bodies);
+  CHECK(coloring.loneCount() == 200);
+  CHECK(coloring.colours() == 0);
+}

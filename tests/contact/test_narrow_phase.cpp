@@ -1,0 +1,136 @@
+#include "scenes.hpp"
+#include "support/catch.hpp"
+#include <gravel/contact/narrow_phase.hpp>
+
+#include <omp.h>
+
+using namespace gravel;
+using namespace gravel::test;
+
+namespace {
+
+template <class S>
+bool sameContact(const Contact<S>& a, const Contact<S>& b) {
+  return a.first == b.first && a.second == b.second && a.key1 == b.key1 && a.key2 == b.key2 &&
+         a.normal == b.normal && a.gap == b.gap && a.arm1 == b.arm1 && a.arm2 == b.arm2 &&
+         a.material == b.material && a.drift == b.drift;
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("contacts of a crowd are those of a brute-force loop, sorted by keys", "", float, double,
+                   long double) {
+  using S = TestType;
+  const Bodies<S, SoA> bodies = randomCloud<S>(150, 5.0, 2);
+  const auto contacts = contactsOf<S>(bodies, Material<S>{}, {{Vector3<S>(0, 0, 1), S(-2), {}}});
+  std::size_t found = 0;
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    for (std::size_t j = i + 1; j < bodies.size(); ++j) {
+      const Vector3<S> r_ij = bodies[j].position() - bodies[i].position();
+      const S reach = bodies[i].radius() + bodies[j].radius();
+      if (r_ij.norm() < reach) {
+        REQUIRE(found < contacts.size());
+        const Contact<S>& c = contacts[found++];
+        CHECK(c.key1 == i);
+        CHECK(c.key2 == j);
+        CHECK((c.normal - r_ij.normalized()).norm() <= S(4) * eps<S>);
+        CHECK(std::abs(c.gap - (r_ij.norm() - reach)) <= S(4) * eps<S> * reach);
+        CHECK(std::abs(c.arm1 * bodies[j].radius() - c.arm2 * bodies[i].radius()) <= S(4) * eps<S>);
+      }
+    }
+    const S depth = bodies[i].position()[2] + S(2) - bodies[i].radius();
+    if (depth < S(0)) {
+      REQUIRE(found < contacts.size());
+      const Contact<S>& c = contacts[found++];
+      CHECK(c.second == staticPartner);
+      CHECK(c.key2 == boundaryKey(0));
+      CHECK(c.normal == Vector3<S>(0, 0, -1));
+      CHECK(std::abs(c.gap - depth) <= S(4) * eps<S>);
+      CHECK(c.arm1 == bodies[i].radius());
+    }
+  }
+  CHECK(found == contacts.size());
+  CHECK(found > 100);
+}
+
+TEST_CASE("the list is the same for any number of threads") {
+  const Bodies<double, SoA> bodies = randomCloud<double>(400, 6.0, 6);
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const auto one = contactsOf<double>(bodies, Material<double>{}, floorAtZero<double>());
+  for (const int threads : {2, 3, 8}) {
+    omp_set_num_threads(threads);
+    const auto many = contactsOf<double>(bodies, Material<double>{}, floorAtZero<double>());
+    CHECK(std::equal(one.begin(), one.end(), many.begin(), many.end(), sameContact<double>));
+  }
+  omp_set_num_threads(before);
+}
+
+TEST_CASE("tracers, pairs of fixed bodies, and fixed bodies in a wall make no contact") {
+  Bodies<double, SoA> bodies;
+  Body<double> body;
+  body.radius = 1;
+  body.fixed = true;
+  bodies.add(body);
+  bodies.add(body);
+  Body<double> tracer;
+  tracer.mass = 0;
+  bodies.add(tracer);
+  body.fixed = false;
+  bodies.add(body);
+  const auto contacts = contactsOf<double>(bodies, Material<double>{}, floorAtZero<double>());
+  REQUIRE(contacts.size() == 3);
+  CHECK((contacts[0].key1 == 0 && contacts[0].key2 == 3));
+  CHECK((contacts[1].key1 == 1 && contacts[1].key2 == 3));
+  CHECK((contacts[2].key1 == 3 && contacts[2].key2 == boundaryKey(0)));
+}
+
+TEST_CASE("a margin takes pairs before they touch; sphere and half-space alike") {
+  auto bodies = column<double>(2, -1e-3, 0.0, 1.0);
+  CHECK(contactsOf<double>(bodies, Material<double>{}, floorAtZero<double>()).empty());
+  const auto contacts = contactsOf<double>(bodies, Material<double>{}, floorAtZero<double>(), 2e-3);
+  REQUIRE(contacts.size() == 2);
+  CHECK_THAT(contacts[0].gap, WithinAbs(1e-3, 1e-15));
+  CHECK_THAT(contacts[1].gap, WithinAbs(1e-3, 1e-15));
+}
+
+TEST_CASE("materials are mixed by id; an id without an entry is refused") {
+  auto bodies = column<double>(3, 1e-3, 0.0, 1.0);
+  bodies[1].setMaterial(MaterialId{1});
+  const std::vector<Material<double>> materials{{1.0, 0.4, 0.4, 0.0}, {0.25, 0.1, 0.1, 0.0}};
+  std::vector<HalfSpace<double>> floor = floorAtZero<double>();
+  floor[0].material = {0.09, 0.9, 0.9, 0.0};
+  std::vector<Contact<double>> contacts;
+  NarrowPhase<double> narrow;
+  narrow.find(allPairs(bodies), bodies, Domain<double>::open(), materials, floor, {}, contacts);
+  REQUIRE(contacts.size() == 3);
+  CHECK(contacts[0].material == mix(materials[0], materials[1]));
+  CHECK(contacts[0].material.restitution == 0.5);
+  CHECK_THAT(contacts[1].material.restitution, WithinRel(0.3, 1e-15));  // the floor's contact
+  bodies[2].setMaterial(MaterialId{2});
+  CHECK_THROWS_WITH(
+      narrow.find(allPairs(bodies), bodies, Domain<double>::open(), materials, floor, {}, contacts),
+      ContainsSubstring("material of a body is 2") && ContainsSubstring("number of materials, 2"));
+}
+
+TEST_CASE("across the face of a sheared domain a contact carries the drift of the image") {
+  const auto domain = Domain<double>::shearPeriodic({10, 10, 10}, 0.5);
+  Bodies<double, SoA> bodies;
+  Body<double> body;
+  body.radius = 0.2;
+  body.position = {4.8, 0, 0};
+  bodies.add(body);
+  body.position = {-4.9, 0, 0};
+  bodies.add(body);
+  std::vector<Contact<double>> contacts;
+  const std::vector<Material<double>> materials(1);
+  NarrowPhase<double>().find(allPairs(bodies), bodies, domain, materials, {}, {}, contacts);
+  REQUIRE(contacts.size() == 1);
+  CHECK_THAT(contacts[0].drift[1], WithinRel(-7.5, 1e-15));
+  CHECK(contacts[0].normal == Vector3<double>(1, 0, 0));
+  // Friction acts on the drift: the bodies are dragged along it, with momentum kept.
+  bodies[0].velocity() = Vector3<double>(1, 0, 0);
+  ContactSolver<double>().solve(contacts, bodies, 0.01);
+  CHECK(bodies[0].velocity()[1] < 0.0);
+  CHECK(bodies[1].velocity()[1] == -bodies[0].velocity()[1]);
+}

@@ -1,0 +1,145 @@
+#include "scenes.hpp"
+#include "support/catch.hpp"
+#include <gravel/contact/positional_correction.hpp>
+
+using namespace gravel;
+using namespace gravel::test;
+
+namespace {
+
+template <class S, class B>
+CorrectionReport<S> correct(B& bodies, const std::vector<Contact<S>>& contacts,
+                            const CorrectionSettings<S>& settings, PositionalCorrection<S>& correction) {
+  ContactColoring coloring;
+  coloring.build(std::span<const Contact<S>>(contacts), bodies);
+  return correction.apply(contacts, coloring, bodies, settings);
+}
+
+template <class S>
+S gapOf(const Bodies<S, SoA>& bodies, std::size_t i, std::size_t j) {
+  return (bodies[j].position() - bodies[i].position()).norm() - bodies[i].radius() - bodies[j].radius();
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("one overlap is (1 - factor) of what it was; centre of mass and velocities stay", "",
+                   float, double, long double) {
+  using S = TestType;
+  for (const double part : {0.2, 0.8, 1.0}) {
+    const S factor = static_cast<S>(part);
+    Bodies<S, SoA> bodies;
+    Body<S> body;
+    body.radius = S(1);
+    body.velocity = Vector3<S>(1, -2, 3);
+    bodies.add(body);
+    body.position = Vector3<S>(S(1.1), S(1.1), S(1.1));
+    body.mass = S(5);
+    bodies.add(body);
+    const auto contacts = contactsOf<S>(bodies, Material<S>{});
+    REQUIRE(contacts.size() == 1);
+    const S before = gapOf(bodies, 0, 1);
+    CorrectionSettings<S> settings;
+    settings.factor = factor;
+    PositionalCorrection<S> correction;
+    const auto report = correct(bodies, contacts, settings, correction);
+    CHECK(std::abs(gapOf(bodies, 0, 1) - (S(1) - factor) * before) <= S(8) * eps<S>);
+    CHECK((bodies[0].position() + S(5) * bodies[1].position() - S(5) * body.position).norm() <=
+          S(16) * eps<S>);
+    CHECK(Vector3<S>(bodies[0].velocity()) == Vector3<S>(1, -2, 3));
+    CHECK(report.largestOverlap == -before);
+    REQUIRE(correction.displacements().size() == 2);
+    CHECK(correction.displacements()[0].body == 0);
+    CHECK(Vector3<S>(bodies[0].position()) == correction.displacements()[0].shift);
+  }
+}
+
+TEST_CASE("a crowd opens: largest overlap shrinks, centre of mass stays, no velocity changes") {
+  Bodies<double, SoA> bodies = randomCloud<double>(200, 6.0, 12);
+  const auto contacts = contactsOf(bodies, Material<double>{});
+  const Bodies<double, SoA> before = bodies;
+  CorrectionSettings<double> settings;
+  settings.factor = 0.5;
+  settings.cap = 10.0;
+  settings.tolerance = 1e-9;
+  settings.maxIterations = 10000;
+  PositionalCorrection<double> correction;
+  correct(bodies, contacts, settings, correction);
+  Vector3<double> moment = Vector3<double>::Zero();
+  double scale = 0.0;
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    moment += bodies[i].mass() * (bodies[i].position() - before[i].position());
+    scale += bodies[i].mass() * bodies[i].position().norm();
+    CHECK(Vector3<double>(bodies[i].velocity()) == Vector3<double>(before[i].velocity()));
+  }
+  CHECK(moment.norm() <= 1e-15 * scale * std::sqrt(200.0));
+  for (const Contact<double>& c : contacts) {
+    CHECK(gapOf(bodies, c.first, c.second) >= 0.5 * c.gap - 1e-7);
+  }
+}
+
+TEST_CASE("slop stays, the cap holds deep overlaps back, fixed partners and walls do not move") {
+  Bodies<double, SoA> bodies = column<double>(1, 1e-3, 0.0, 1.0);
+  const auto contacts = contactsOf(bodies, Material<double>{}, floorAtZero<double>());
+  PositionalCorrection<double> correction;
+  CorrectionSettings<double> settings;
+  settings.factor = 1.0;
+  settings.slop = 4e-4;
+  correct(bodies, contacts, settings, correction);
+  CHECK_THAT(bodies[0].position()[2], WithinAbs(0.5 - 4e-4, 1e-15));
+
+  Bodies<double, SoA> deep;
+  Body<double> body;
+  body.radius = 1.0;
+  body.fixed = true;
+  deep.add(body);
+  body.fixed = false;
+  body.radius = 0.1;
+  body.position = {0.5, 0, 0};
+  deep.add(body);
+  settings.slop = 0.0;
+  settings.cap = 0.5;
+  correct(deep, contactsOf(deep, Material<double>{}), settings, correction);
+  CHECK(Vector3<double>(deep[0].position()) == Vector3<double>(0, 0, 0));
+  CHECK_THAT(deep[1].position()[0], WithinRel(0.5 + 0.5 * 0.1, 1e-14));
+}
+
+TEST_CASE("2 to 100 spheres at one point come apart, finitely, with their centre of mass at rest") {
+  for (const int n : {2, 10, 100}) {
+    Bodies<double, SoA> bodies;
+    Body<double> body;
+    body.radius = 1.0;
+    body.position = {1, 2, 3};
+    for (int i = 0; i < n; ++i) {
+      bodies.add(body);
+    }
+    PositionalCorrection<double> correction;
+    double deepest = 2.0;
+    for (int step = 0; step < 300 && deepest > 1e-3; ++step) {
+      const auto contacts = contactsOf(bodies, Material<double>{});
+      deepest = correct(bodies, contacts, CorrectionSettings<double>{}, correction).largestOverlap;
+    }
+    CHECK(deepest <= 1e-3);
+    Vector3<double> sum = Vector3<double>::Zero();
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      REQUIRE(isFinite(bodies[i].position()));
+      sum += bodies[i].position() - body.position;
+    }
+    CHECK(sum.norm() <= 1e-12 * n);
+  }
+}
+
+TEST_CASE("far from the origin an overlap opens as well as the numbers there can tell") {
+  Bodies<double, SoA> bodies;
+  Body<double> body;
+  body.radius = 1.0;
+  body.position = {1e9, 0, 0};
+  bodies.add(body);
+  body.position = {1e9 + 1.5, 0, 0};
+  bodies.add(body);
+  CorrectionSettings<double> settings;
+  settings.factor = 1.0;
+  settings.cap = 1.0;
+  PositionalCorrection<double> correction;
+  correct(bodies, contactsOf(bodies, Material<double>{}), settings, correction);
+  CHECK_THAT(bodies[1].position()[0] - bodies[0].position()[0], WithinAbs(2.0, 4e-7));  // two units at 1e9
+}
