@@ -116,8 +116,8 @@ class Bodies {
   /// Ids below `first` are not given any more: a restart says so of bodies that were removed before it.
   void skipIds(BodyId first) { nextId_ = std::max(nextId_, toInteger(first)); }
 
-  /// Takes over all bodies of another container, whatever its layout, with their ids and every field. The own
-  /// storage stays the same object: a user's arrays are written to.
+  /// Takes over all bodies of another container, whatever its layout, with their ids, the next id and every
+  /// field. The own storage stays the same object: a user's arrays are written to.
   template <class Other>
   void assign(const Bodies<Scalar, Other>& other) {
     decltype(index_) index;
@@ -130,7 +130,7 @@ class Bodies {
       detail::copyBody(storage_, i, other.storage(), i);
     }
     index_.swap(index);
-    skipIds(other.nextId());
+    nextId_ = toInteger(other.nextId());
     ++revision_;
   }
 

@@ -66,8 +66,9 @@ class ContactStage {
     });
   }
 
-  /// Finds all contacts at the present positions.
-  void detect(const Bodies& bodies, const Config& config, const Scalar& time, Profiler& profiler) {
+  /// Finds all contacts at the present positions, for steps of length h [s].
+  void detect(const Bodies& bodies, const Config& config, const Scalar& time, const Scalar& h,
+              Profiler& profiler) {
     contacts_.clear();
     coloured_ = false;
     const char* reason = reasonToSkip(bodies);
@@ -79,7 +80,12 @@ class ContactStage {
     {
       const Profiler::Scope scope(profiler, Phase::NeighbourSearch);
       neighbours_.setKind(config.broadPhase);
-      neighbours_.update(bodies.positions(), bodies.radii(), bodies.ids(), bodies.revision(), domain, time);
+      Scalar largest(0);
+      for (std::size_t i = 0; i < bodies.size(); ++i) {
+        largest = std::max<Scalar>(largest, bodies.radii()[i]);
+      }
+      neighbours_.update(bodies.positions(), bodies.radii(), bodies.ids(), bodies.revision(), domain, time,
+                         Scalar(Scalar(2) * largest * NarrowPhase<Scalar>::restingMargin()));
     }
     const Profiler::Scope scope(profiler, Phase::NarrowPhase);
     materials_[0] = defaultOf(config);
@@ -87,8 +93,8 @@ class ContactStage {
     for (const Plane<Scalar>& plane : planes) {
       walls_.push_back({plane.normal, plane.offset, materials_[static_cast<std::size_t>(plane.material)]});
     }
-    narrow_.find(neighbours_.pairs(), bodies, domain, materials_, walls_, {time, config.epsilon, Scalar(0)},
-                 contacts_);
+    narrow_.find(neighbours_.pairs(), bodies, domain, materials_, walls_,
+                 {time, config.epsilon, Scalar(0), h}, contacts_);
   }
 
   /// Shrinks overlaps by moving bodies, and renews the geometry of the contacts, so that impulses act where
@@ -155,95 +161,40 @@ class ContactStage {
   }
 
   /// A new step: its report starts empty.
-  void beginStep() { report_ = {}; }
-
-  /// Impulses of the last step [N s], in the order of contacts().
-  std::span<const ContactImpulse<Scalar>> impulses() const {
-    return contacts_.empty() ? std::span<const ContactImpulse<Scalar>>() : solver_.impulses();
+  void beginStep() {
+    report_ = {};
+    firstHalf_.clear();
   }
 
-  void save(SnapshotWriter& out) const {
-    out.value("domain", static_cast<std::uint32_t>(domain.kind()));
-    out.array("domain lengths", domain.lengths().data(), 3);
-    std::vector<Scalar> numbers;
-    std::vector<std::uint32_t> surfaces;
-    for (const Plane<Scalar>& plane : planes) {
-      numbers.insert(numbers.end(), {plane.normal[0], plane.normal[1], plane.normal[2], plane.offset});
-      surfaces.push_back(static_cast<std::uint32_t>(plane.material));
+  /// The first half of the step is solved: its impulses are kept for impulses().
+  void endFirstHalf() { firstHalf_ = solver_.memory(); }
+
+  /// Impulses of both halves of the step [N s], in the order of contacts(). A contact that ended in the drift
+  /// is not among them. O(contacts).
+  std::vector<ContactImpulse<Scalar>> impulses() const {
+    std::vector<ContactImpulse<Scalar>> sum;
+    std::size_t m = 0;
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+      sum.push_back(k < solver_.impulses().size() ? solver_.impulses()[k] : ContactImpulse<Scalar>{});
+      const auto before = [&](const StoredImpulse<Scalar>& stored) {
+        return stored.key1 != contacts_[k].key1 ? stored.key1 < contacts_[k].key1
+                                                : stored.key2 < contacts_[k].key2;
+      };
+      while (m < firstHalf_.size() && before(firstHalf_[m])) {
+        ++m;
+      }
+      if (m < firstHalf_.size() && firstHalf_[m].key1 == contacts_[k].key1 &&
+          firstHalf_[m].key2 == contacts_[k].key2) {
+        sum.back().normal += firstHalf_[m].impulse.normal;
+        sum.back().tangential += firstHalf_[m].impulse.tangential;
+      }
     }
-    out.array("planes", numbers.data(), numbers.size());
-    out.array("materials of planes", surfaces.data(), surfaces.size());
-    out.array("materials", materials_.data(), materials_.size());
-    std::vector<std::uint64_t> keys;
-    numbers.clear();
-    for (const StoredImpulse<Scalar>& stored : solver_.memory()) {
-      const ContactImpulse<Scalar>& j = stored.impulse;
-      keys.insert(keys.end(), {stored.key1, stored.key2});
-      numbers.insert(numbers.end(), {j.normal, j.tangential[0], j.tangential[1], j.tangential[2]});
-    }
-    std::vector<std::uint64_t> names;
-    std::vector<Scalar> places;
-    for (const Contact<Scalar>& c : contacts_) {
-      const Material<Scalar>& m = c.material;
-      names.insert(names.end(), {c.first, c.second, c.key1, c.key2});
-      places.insert(places.end(), {c.normal[0], c.normal[1], c.normal[2], c.gap, c.arm1, c.arm2, c.drift[0],
-                                   c.drift[1], c.drift[2], m.restitution, m.staticFriction, m.kineticFriction,
-                                   m.tangentialRestitution});
-    }
-    out.array("names of contacts", names.data(), names.size());
-    out.array("contacts", places.data(), places.size());
-    out.array("keys of impulses", keys.data(), keys.size());
-    out.array("impulses", numbers.data(), numbers.size());
-    out.value("step of impulses", solver_.memoryStep());
+    return sum;
   }
 
+  void save(SnapshotWriter& out) const;
   /// \throws std::runtime_error, std::invalid_argument if the file does not hold what save() writes
-  void load(SnapshotReader& in) {
-    const auto kind = in.value<std::uint32_t>("domain");
-    const std::vector<Scalar> lengths = in.array<Scalar>("domain lengths");
-    if (lengths.size() != 3 || kind > static_cast<std::uint32_t>(DomainKind::Periodic)) {
-      in.fail("holds a domain that is neither open nor periodic");
-    }
-    if (static_cast<DomainKind>(kind) == DomainKind::Periodic) {
-      domain = Domain<Scalar>::periodic({lengths[0], lengths[1], lengths[2]});
-    }
-    const std::vector<Scalar> sides = in.array<Scalar>("planes");
-    const auto surfaces = in.array<std::uint32_t>("materials of planes");
-    materials_ = in.array<Material<Scalar>>("materials");
-    const auto names = in.array<std::uint64_t>("names of contacts");
-    const std::vector<Scalar> places = in.array<Scalar>("contacts");
-    const auto keys = in.array<std::uint64_t>("keys of impulses");
-    const std::vector<Scalar> impulses = in.array<Scalar>("impulses");
-    if (sides.size() != 4 * surfaces.size() || impulses.size() != 2 * keys.size() || materials_.empty() ||
-        places.size() * 4 != names.size() * 13) {
-      in.fail("holds lists of different lengths");
-    }
-    for (std::size_t p = 0; p < surfaces.size(); ++p) {
-      checkMaterial(surfaces[p], "plane " + std::to_string(p));
-      const Scalar* side = &sides[4 * p];
-      planes.push_back({{side[0], side[1], side[2]}, side[3], MaterialId{surfaces[p]}});
-    }
-    for (std::size_t k = 0; k < names.size() / 4; ++k) {
-      const std::uint64_t* name = &names[4 * k];
-      const Scalar* c = &places[13 * k];
-      contacts_.push_back({static_cast<std::uint32_t>(name[0]),
-                           static_cast<std::uint32_t>(name[1]),
-                           name[2],
-                           name[3],
-                           {c[0], c[1], c[2]},
-                           c[3],
-                           c[4],
-                           c[5],
-                           {c[9], c[10], c[11], c[12]},
-                           {c[6], c[7], c[8]}});
-    }
-    std::vector<StoredImpulse<Scalar>> memory(keys.size() / 2);
-    for (std::size_t k = 0; k < memory.size(); ++k) {
-      const Scalar* j = &impulses[4 * k];
-      memory[k] = {keys[2 * k], keys[2 * k + 1], {j[0], {j[1], j[2], j[3]}}};
-    }
-    solver_.setMemory(std::move(memory), in.value<Scalar>("step of impulses"));
-  }
+  void load(SnapshotReader& in);
 
  private:
   static Material<Scalar> defaultOf(const Config& c) {
@@ -297,7 +248,8 @@ class ContactStage {
       const Scalar r1 = bodies.radii()[c.first];
       if (c.second == staticPartner) {
         const HalfSpace<Scalar>& wall = walls_[static_cast<std::size_t>(c.key2 - boundaryKey(0))];
-        c.gap = std::min<Scalar>(wall.normal.dot(x1) - wall.offset - r1, Scalar(0));
+        const Scalar gap = wall.normal.dot(x1) - wall.offset - r1;
+        c.gap = c.gap > Scalar(0) ? gap : std::min<Scalar>(gap, Scalar(0));
         return;
       }
       Vector3<Scalar> r_12 = Vector3<Scalar>(bodies.positions()[c.second]) - x1;
@@ -307,7 +259,7 @@ class ContactStage {
       const auto touch = sphereSphere<Scalar>(r_12, r1, r2, c.key1, c.key2, config.epsilon, r1 + r2);
       if (touch) {
         c.normal = touch->normal;
-        c.gap = std::min<Scalar>(touch->gap, Scalar(0));
+        c.gap = c.gap > Scalar(0) ? touch->gap : std::min<Scalar>(touch->gap, Scalar(0));
         c.arm1 = touch->arm1;
         c.arm2 = touch->arm2;
       }
@@ -332,6 +284,7 @@ class ContactStage {
   NarrowPhase<Scalar> narrow_;
   std::vector<Contact<Scalar>> contacts_;
   ContactSolver<Scalar> solver_;
+  std::vector<StoredImpulse<Scalar>> firstHalf_;
   ContactReport<Scalar> report_;
   bool moved_ = false;
   bool coloured_ = false;  // solver_ knows the present contacts

@@ -117,6 +117,9 @@ class Space : public Settings<Scalar> {
   const ContactReport<Scalar>& contactReport() const { return contact_.report(); }
   /// Contacts of the last step, in the order of ids.
   const std::vector<Contact<Scalar>>& contacts() const { return contact_.contacts(); }
+  /// Impulses [N s] over the last step, in the order of contacts(). A contact's mean force is its impulse
+  /// over getPreviousTimeStep().
+  std::vector<ContactImpulse<Scalar>> contactImpulses() const { return contact_.impulses(); }
   /// Bodies that touch each body, by index, at the last step.
   std::vector<std::vector<std::size_t>> collisionGraph() const;
   /// Seconds by phase, and what was skipped and why, on standard output.

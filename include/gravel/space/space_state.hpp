@@ -4,6 +4,7 @@
 /// Members of `Space` that look at its state, report it, save it and take it up again.
 
 #include <gravel/output/snapshot.hpp>
+#include <gravel/space/contact_stage_snapshot.hpp>
 #include <gravel/space/space.hpp>
 
 namespace gravel {

@@ -54,7 +54,10 @@ template <Real Scalar, class Layout>
 struct Space<Scalar, Layout>::Departure {
   Space* space;
   explicit operator bool() const { return space->contactCount() > 0; }
-  void operator()(const Scalar& kick) const { space->solveContacts(kick); }
+  void operator()(const Scalar& kick) const {
+    space->solveContacts(kick);
+    space->contact_.endFirstHalf();
+  }
 };
 
 template <Real Scalar, class Layout>
@@ -147,7 +150,7 @@ void Space<Scalar, Layout>::applyGravity() {
 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::buildCollisionGraph() {
-  contact_.detect(bodies_, this->config_, Scalar(time_), profiler_);
+  contact_.detect(bodies_, this->config_, time_, previous_dt_, profiler_);
 }
 
 template <Real Scalar, class Layout>

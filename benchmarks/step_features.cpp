@@ -1,0 +1,128 @@
+/// What a feature costs that a scene does not use: the same step with the feature absent, present but
+/// unneeded, and needed. "Present but unneeded" should cost what "absent" costs, and changes no bit
+/// (tests/space).
+
+#include <gravel/gravel.hpp>
+
+#include <benchmark/benchmark.h>
+
+namespace {
+
+using namespace gravel;
+
+enum class Use { Absent, Unneeded, Needed };
+
+/// 4096 spheres at random in a cube, 1 % of it filled, moving slowly; no gravity.
+Space<double> dilute(const SimulationConfig<double>& chosen) {
+  SimulationConfig<double> config = chosen;
+  config.timeStep = 1e-3;
+  config.adaptiveTimeStep = false;
+  Space<double> space(config);
+  const CounterRandom random(7);
+  for (std::uint64_t i = 0; i < 4096; ++i) {
+    Body<double> body;
+    body.position = {2.2 * 3.4 * double(i % 16), 2.2 * 3.4 * double(i / 16 % 16),
+                     2.2 * 3.4 * double(i / 256)};
+    body.velocity = random.direction(i) * 0.1;
+    body.radius = 1.0;
+    space.addBody(body);
+  }
+  return space;
+}
+
+void run(benchmark::State& state, Space<double>& space) {
+  std::size_t step = 0;
+  for (auto _ : state) {
+    space.computeDynamics(step++);
+  }
+  state.counters["ns_per_body"] =
+      benchmark::Counter(1e-9 * static_cast<double>(space.n()),
+                         benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+
+SimulationConfig<double> quiet() {
+  SimulationConfig<double> config;
+  config.G = 0.0;
+  return config;
+}
+
+/// Gravity: switched off; on with bodies that have no mass to speak of is not unneeded, so there is no
+/// middle.
+void Gravity(benchmark::State& state, Use use) {
+  SimulationConfig<double> config = quiet();
+  config.G = use == Use::Needed ? 6.6743e-11 : 0.0;
+  Space<double> space = dilute(config);
+  run(state, space);
+}
+BENCHMARK_CAPTURE(Gravity, absent, Use::Absent);
+BENCHMARK_CAPTURE(Gravity, needed, Use::Needed);
+
+/// Friction: coefficients 0; coefficients but no contact.
+void Friction(benchmark::State& state, Use use) {
+  SimulationConfig<double> config = quiet();
+  config.coeffFriction = use == Use::Absent ? 0.0 : 0.5;
+  config.coeffStaticFriction = config.coeffFriction;
+  Space<double> space = dilute(config);
+  run(state, space);
+}
+BENCHMARK_CAPTURE(Friction, absent, Use::Absent);
+BENCHMARK_CAPTURE(Friction, unneeded, Use::Unneeded);
+
+/// A plane: none; one far away from all bodies; a floor under the lowest layer.
+void Plane(benchmark::State& state, Use use) {
+  Space<double> space = dilute(quiet());
+  if (use != Use::Absent) {
+    space.addPlane({0, 0, 1}, use == Use::Unneeded ? -1e3 : -0.999);
+  }
+  run(state, space);
+}
+BENCHMARK_CAPTURE(Plane, absent, Use::Absent);
+BENCHMARK_CAPTURE(Plane, unneeded, Use::Unneeded);
+BENCHMARK_CAPTURE(Plane, needed, Use::Needed);
+
+/// Spin: bodies that do not turn need no orientation.
+void Spin(benchmark::State& state, Use use) {
+  Space<double> space = dilute(quiet());
+  for (std::size_t i = 0; i < space.n() && use == Use::Needed; ++i) {
+    space.body(i).angularVelocity() = Vector3<double>(0.1, 0.2, 0.3);
+  }
+  run(state, space);
+}
+BENCHMARK_CAPTURE(Spin, absent, Use::Absent);
+BENCHMARK_CAPTURE(Spin, needed, Use::Needed);
+
+/// Damping rates of zero; and not.
+void Damping(benchmark::State& state, Use use) {
+  SimulationConfig<double> config = quiet();
+  config.linearDamping = use == Use::Needed ? 0.1 : 0.0;
+  Space<double> space = dilute(config);
+  run(state, space);
+}
+BENCHMARK_CAPTURE(Damping, absent, Use::Absent);
+BENCHMARK_CAPTURE(Damping, needed, Use::Needed);
+
+/// Diagnostics: off; on, between two lines of the log; on, a line every step.
+void Diagnostics(benchmark::State& state, Use use) {
+  SimulationConfig<double> config = quiet();
+  config.diagnosticsEnabled = use != Use::Absent;
+  config.logFrequency = use == Use::Needed ? 1 : 1000000000;
+  Space<double> space = dilute(config);
+  space.setLog([](const char*) {});
+  run(state, space);
+}
+BENCHMARK_CAPTURE(Diagnostics, absent, Use::Absent);
+BENCHMARK_CAPTURE(Diagnostics, unneeded, Use::Unneeded);
+BENCHMARK_CAPTURE(Diagnostics, needed, Use::Needed);
+
+/// Contacts at all: points; spheres that stay apart.
+void Contacts(benchmark::State& state, Use use) {
+  Space<double> space = dilute(quiet());
+  for (std::size_t i = 0; i < space.n() && use == Use::Absent; ++i) {
+    space.body(i).radius() = 0.0;
+  }
+  run(state, space);
+}
+BENCHMARK_CAPTURE(Contacts, absent, Use::Absent);
+BENCHMARK_CAPTURE(Contacts, unneeded, Use::Unneeded);
+
+}  // namespace

@@ -1,0 +1,94 @@
+#pragma once
+
+/// \file
+/// What a snapshot holds of boundaries, materials and contacts.
+
+#include <gravel/space/contact_stage.hpp>
+
+namespace gravel {
+
+template <Real Scalar, class Layout>
+void ContactStage<Scalar, Layout>::save(SnapshotWriter& out) const {
+  out.value("domain", static_cast<std::uint32_t>(domain.kind()));
+  out.array("domain lengths", domain.lengths().data(), 3);
+  std::vector<Scalar> numbers;
+  std::vector<std::uint32_t> surfaces;
+  for (const Plane<Scalar>& plane : planes) {
+    numbers.insert(numbers.end(), {plane.normal[0], plane.normal[1], plane.normal[2], plane.offset});
+    surfaces.push_back(static_cast<std::uint32_t>(plane.material));
+  }
+  out.array("planes", numbers.data(), numbers.size());
+  out.array("materials of planes", surfaces.data(), surfaces.size());
+  out.array("materials", materials_.data(), materials_.size());
+  std::vector<std::uint64_t> keys;
+  numbers.clear();
+  for (const StoredImpulse<Scalar>& stored : solver_.memory()) {
+    const ContactImpulse<Scalar>& j = stored.impulse;
+    keys.insert(keys.end(), {stored.key1, stored.key2});
+    numbers.insert(numbers.end(), {j.normal, j.tangential[0], j.tangential[1], j.tangential[2]});
+  }
+  std::vector<std::uint64_t> names;
+  std::vector<Scalar> places;
+  for (const Contact<Scalar>& c : contacts_) {
+    const Material<Scalar>& m = c.material;
+    names.insert(names.end(), {c.first, c.second, c.key1, c.key2});
+    places.insert(places.end(),
+                  {c.normal[0], c.normal[1], c.normal[2], c.gap, c.arm1, c.arm2, c.drift[0], c.drift[1],
+                   c.drift[2], m.restitution, m.staticFriction, m.kineticFriction, m.tangentialRestitution});
+  }
+  out.array("names of contacts", names.data(), names.size());
+  out.array("contacts", places.data(), places.size());
+  out.array("keys of impulses", keys.data(), keys.size());
+  out.array("impulses", numbers.data(), numbers.size());
+  out.value("step of impulses", solver_.memoryStep());
+}
+
+template <Real Scalar, class Layout>
+void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
+  const auto kind = in.value<std::uint32_t>("domain");
+  const std::vector<Scalar> lengths = in.array<Scalar>("domain lengths");
+  if (lengths.size() != 3 || kind > static_cast<std::uint32_t>(DomainKind::Periodic)) {
+    in.fail("holds a domain that is neither open nor periodic");
+  }
+  if (static_cast<DomainKind>(kind) == DomainKind::Periodic) {
+    domain = Domain<Scalar>::periodic({lengths[0], lengths[1], lengths[2]});
+  }
+  const std::vector<Scalar> sides = in.array<Scalar>("planes");
+  const auto surfaces = in.array<std::uint32_t>("materials of planes");
+  materials_ = in.array<Material<Scalar>>("materials");
+  const auto names = in.array<std::uint64_t>("names of contacts");
+  const std::vector<Scalar> places = in.array<Scalar>("contacts");
+  const auto keys = in.array<std::uint64_t>("keys of impulses");
+  const std::vector<Scalar> impulses = in.array<Scalar>("impulses");
+  if (sides.size() != 4 * surfaces.size() || impulses.size() != 2 * keys.size() || materials_.empty() ||
+      places.size() * 4 != names.size() * 13) {
+    in.fail("holds lists of different lengths");
+  }
+  for (std::size_t p = 0; p < surfaces.size(); ++p) {
+    checkMaterial(surfaces[p], "plane " + std::to_string(p));
+    const Scalar* side = &sides[4 * p];
+    planes.push_back({{side[0], side[1], side[2]}, side[3], MaterialId{surfaces[p]}});
+  }
+  for (std::size_t k = 0; k < names.size() / 4; ++k) {
+    const std::uint64_t* name = &names[4 * k];
+    const Scalar* c = &places[13 * k];
+    contacts_.push_back({static_cast<std::uint32_t>(name[0]),
+                         static_cast<std::uint32_t>(name[1]),
+                         name[2],
+                         name[3],
+                         {c[0], c[1], c[2]},
+                         c[3],
+                         c[4],
+                         c[5],
+                         {c[9], c[10], c[11], c[12]},
+                         {c[6], c[7], c[8]}});
+  }
+  std::vector<StoredImpulse<Scalar>> memory(keys.size() / 2);
+  for (std::size_t k = 0; k < memory.size(); ++k) {
+    const Scalar* j = &impulses[4 * k];
+    memory[k] = {keys[2 * k], keys[2 * k + 1], {j[0], {j[1], j[2], j[3]}}};
+  }
+  solver_.setMemory(std::move(memory), in.value<Scalar>("step of impulses"));
+}
+
+}  // namespace gravel
