@@ -84,7 +84,7 @@ TEST_CASE("the rms error of double stays below 3e-16 at 3000 bodies") {
 }
 
 // The bound of double is that of the validation cases; the others' are in proportion to their roundoff.
-// Seen to fail with the reaction on the source taken with the factor of the first body's mass left out.
+// Seen to fail with the mass left out of the reaction.
 TEMPLATE_TEST_CASE("the total force vanishes: |sum m a| <= 1e-15 sum m |a| in double", "", float, double,
                    long double) {
   using S = TestType;

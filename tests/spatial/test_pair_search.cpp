@@ -178,18 +178,22 @@ TEST_CASE("bodies far from one another and from the origin are found by their di
   }
 }
 
-TEST_CASE("the automatic choice: all pairs for few, a grid for like radii side by side, else the k-d tree") {
+TEST_CASE("the automatic choice: all pairs for few bodies, the k-d tree for crowded clumps, else the grid") {
   const auto chosen = [](const Cloud<double>& cloud) {
     BroadPhase<double> method;
     std::vector<Pair> pairs;
     method.findPairs(cloud.positions, cloud.radii, cloud.ids, 0.0, Domain<double>::open(), 0.0, pairs);
+    CHECK(named(pairs, cloud) == search(BroadPhaseKind::AllPairs, cloud, 0.0, Domain<double>::open(), 0.0));
     return std::string(method.name());
   };
   CHECK(chosen(randomCloud<double>(20, 1.0, 0.1, 1.0, 28)) == "all pairs");
   CHECK(chosen(randomCloud<double>(2000, 1.0, 0.05, 1.0, 28)) == "grid");
-  CHECK(chosen(randomCloud<double>(2000, 1.0, 0.05, 100.0, 28)) == "k-d tree");
-  CHECK(chosen(randomCloud<double>(2000, 1e4, 0.05, 1.0, 28)) == "k-d tree");
-  CHECK(chosen(randomCloud<double>(2000, 1.0, 0.0, 1.0, 28)) == "k-d tree");
+  CHECK(chosen(randomCloud<double>(2000, 1.0, 0.05, 100.0, 28)) == "grid");
+  CHECK(chosen(randomCloud<double>(2000, 1e4, 0.05, 1.0, 28)) == "grid");
+  CHECK(chosen(randomCloud<double>(2000, 1.0, 0.0, 1.0, 28)) == "grid");
+  auto clump = randomCloud<double>(2000, 1.0, 0.05, 1.0, 28);
+  clump.positions[0] = {1e5, 1e5, 1e5};
+  CHECK(chosen(clump) == "k-d tree");
 }
 
 TEST_CASE("searches refuse what is no place or no radius, naming body and value") {

@@ -11,6 +11,8 @@
 
 namespace gravel {
 
+/// `Automatic`: all pairs for few bodies, the grid, or the k-d tree where bodies crowd in a small part of
+/// their bounding box.
 enum class BroadPhaseKind { Automatic, AllPairs, KDTree, Grid };
 
 namespace detail {
@@ -27,7 +29,8 @@ struct BroadPhaseMethods<S, true> {
 }  // namespace detail
 
 /// Finds the pairs of bodies that touch or nearly touch. To add a method: one header with its `findPairs`,
-/// one line in the variant, one name in the enumeration and in `select`.
+/// one
+/// line in the variant, one name in the enumeration and in `findPairs`.
 template <Real S>
 class BroadPhase {
  public:
@@ -51,53 +54,38 @@ class BroadPhase {
                  const Domain<S>& domain, const S& time, std::vector<Pair>& out) {
     detail::require("margin of a pair search", margin, detail::nonNegative<S>());
     detail::gatherSpheres(positions, radii, ids, domain, time, spheres_);
-    select(margin);
+    if constexpr (std::is_floating_point_v<S>) {
+      if (kind_ == BroadPhaseKind::Automatic && spheres_.size() > fewBodies) {
+        const UniformGrid<S>& grid = use<GridPairs<S>>().build(spheres_, margin);
+        if (grid.crowding() <= crowded) {
+          use<GridPairs<S>>().search(spheres_, margin, domain, time, out);
+        } else {
+          use<KDTreePairs<S>>().findPairs(spheres_, margin, domain, time, out);
+        }
+        return;
+      }
+      if (kind_ == BroadPhaseKind::KDTree) {
+        use<KDTreePairs<S>>();
+      } else if (kind_ == BroadPhaseKind::Grid) {
+        use<GridPairs<S>>();
+      } else {
+        use<AllPairs<S>>();
+      }
+    }
     std::visit([&](auto& method) { method.findPairs(spheres_, margin, domain, time, out); }, method_);
   }
 
  private:
+  // As measured by benchmarks/broad_phase_methods.cpp.
+  static constexpr std::size_t fewBodies = 24;
+  static constexpr double crowded = 8.0;
+
   template <class Method>
-  void use() {
+  Method& use() {
     if (!std::holds_alternative<Method>(method_)) {
       method_.template emplace<Method>();
     }
-  }
-
-  void select(const S& margin) {
-    if constexpr (std::is_floating_point_v<S>) {
-      const BroadPhaseKind kind = kind_ == BroadPhaseKind::Automatic ? automatic(margin) : kind_;
-      if (kind == BroadPhaseKind::AllPairs) {
-        use<AllPairs<S>>();
-      } else if (kind == BroadPhaseKind::KDTree) {
-        use<KDTreePairs<S>>();
-      } else {
-        use<GridPairs<S>>();
-      }
-    }
-  }
-
-  /// Thresholds as measured by benchmarks/broad_phase_methods.cpp.
-  BroadPhaseKind automatic(const S& margin) const {
-    constexpr std::size_t fewBodies = 64;
-    if (spheres_.size() <= fewBodies) {
-      return BroadPhaseKind::AllPairs;
-    }
-    Vector3<S> low = spheres_[0].home;
-    Vector3<S> high = low;
-    S largest(0);
-    S sum(0);
-    for (const detail::Sphere<S>& s : spheres_) {
-      low = low.cwiseMin(s.home);
-      high = high.cwiseMax(s.home);
-      largest = std::max(largest, s.radius);
-      sum += s.radius;
-    }
-    const auto n = static_cast<S>(spheres_.size());
-    const S cell = S(2) * largest + margin;
-    const Vector3<S> count = (high - low) / cell + Vector3<S>::Ones();
-    const bool alike = sum > S(0.4) * largest * n;
-    const bool dense = count.prod() < S(8) * n;  // false also if nothing has a radius
-    return alike && dense ? BroadPhaseKind::Grid : BroadPhaseKind::KDTree;
+    return std::get<Method>(method_);
   }
 
   BroadPhaseKind kind_;

@@ -1,7 +1,7 @@
 #pragma once
 
 /// \file
-/// Uniform grid of cells: the fastest search where radii are alike and bodies fill their bounding box.
+/// Uniform grid of cells: the fastest search unless bodies crowd in a small part of their bounding box.
 
 #include <gravel/spatial/queries.hpp>
 
@@ -57,6 +57,16 @@ class UniformGrid {
   std::size_t size() const { return entries_.size(); }
   S cell() const { return cell_; }
 
+  /// Points in the cell of a point, on average over the points: what a query has to look through.
+  double crowding() const {
+    double sum = 0.0;
+    for (std::size_t c = 0; c + 1 < start_.size(); ++c) {
+      const auto count = static_cast<double>(start_[c + 1] - start_[c]);
+      sum += count * count;
+    }
+    return entries_.empty() ? 0.0 : sum / static_cast<double>(entries_.size());
+  }
+
   /// Calls visit(index, squared distance) for each point with distance < radius, in no promised order.
   /// Safe from several threads at once. O(cells met + hits).
   template <class Visitor>
@@ -107,8 +117,9 @@ class UniformGrid {
   std::size_t count_[3] = {0, 0, 0};
 };
 
-/// Pair search on a uniform grid whose cells hold two of the largest bodies side by side. O(N + pairs) where
-/// radii are alike; with a wide spread of radii use the k-d tree.
+/// Pair search on a uniform grid. Cells fit two bodies of the mean radius side by side; a larger body asks
+/// more cells, whose number is in proportion to the bodies it may touch. O(N + pairs) for any radii, as long
+/// as no cell is crowded.
 template <std::floating_point S>
 class GridPairs {
  public:
@@ -123,8 +134,24 @@ class GridPairs {
 
   void findPairs(const std::vector<detail::Sphere<S>>& spheres, const S& margin, const Domain<S>& domain,
                  const S& time, std::vector<Pair>& out) {
-    const S reach = S(2) * detail::LargestRadii<S>(spheres).largest + margin;
-    grid_.build(detail::Homes<S>{&spheres}, reach > S(0) ? reach : S(1));
+    build(spheres, margin);
+    search(spheres, margin, domain, time, out);
+  }
+
+  /// The two halves of findPairs, for those who look at the grid in between.
+  const UniformGrid<S>& build(const std::vector<detail::Sphere<S>>& spheres, const S& margin) {
+    S sum(0);
+    std::size_t count = 0;
+    for (const detail::Sphere<S>& s : spheres) {
+      sum += s.radius;
+      count += s.radius > S(0) ? 1U : 0U;
+    }
+    const S cell = (count == 0 ? S(0) : S(2) * sum / static_cast<S>(count)) + margin;
+    grid_.build(detail::Homes<S>{&spheres}, cell > S(0) ? cell : S(1));
+    return grid_;
+  }
+  void search(const std::vector<detail::Sphere<S>>& spheres, const S& margin, const Domain<S>& domain,
+              const S& time, std::vector<Pair>& out) {
     detail::findPairsByQueries(grid_, spheres, margin, domain, time, parts_, out);
   }
 
