@@ -54,6 +54,10 @@ class BroadPhase {
                  const Domain<S>& domain, const S& time, std::vector<Pair>& out) {
     detail::require("margin of a pair search", margin, detail::nonNegative<S>());
     detail::gatherSpheres(positions, radii, ids, domain, time, spheres_);
+    if (std::none_of(spheres_.begin(), spheres_.end(), [](const auto& s) { return s.radius > S(0); })) {
+      out.clear();  // points alone: nothing to search
+      return;
+    }
     if constexpr (std::is_floating_point_v<S>) {
       if (kind_ == BroadPhaseKind::Automatic && spheres_.size() > fewBodies) {
         const UniformGrid<S>& grid = use<GridPairs<S>>().build(spheres_, margin);
