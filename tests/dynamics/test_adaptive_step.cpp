@@ -23,8 +23,6 @@ std::size_t add(Bodies<double>& bodies, const Vec& x, const Vec& v, const Vec& a
   return i;
 }
 
-const auto openSeparation = [](const auto& x1, const auto& x2) { return Vec(Vec(x2) - Vec(x1)); };
-
 }  // namespace
 
 // Two unit masses at distance 2 about their centre, G = 1: omega^2 = G (m1 + m2) / 8 = 1/4. tau = v/a times
@@ -44,8 +42,8 @@ TEST_CASE("A body that starts from rest takes sqrt(l / a) with its radius, or th
   Bodies<double> bodies;
   add(bodies, {0, 0, 0}, {0, 0, 0}, {0, 0, -9.81}, 0.5);
   add(bodies, {1, 0, 0}, {0, 0, 0}, {0, 0, -9.81}, 0.5);
-  CHECK_THAT(stepFromMotion(bodies, 0.0, wide), WithinRel(0.02 * std::sqrt(0.5 / 9.81), 1e-12));
-  CHECK_THAT(stepFromMotion(bodies, 2.0, wide), WithinRel(0.02 * std::sqrt(2.0 / 9.81), 1e-12));
+  CHECK_THAT(stepFromMotion(bodies, 0.0, wide, true), WithinRel(0.02 * std::sqrt(0.5 / 9.81), 1e-12));
+  CHECK_THAT(stepFromMotion(bodies, 2.0, wide, true), WithinRel(0.02 * std::sqrt(2.0 / 9.81), 1e-12));
 }
 
 // Seen to fail: v taken in the axes of space.
@@ -63,9 +61,23 @@ TEST_CASE("A boost changes no step") {
   }
   // v - v_cm loses 2e3 / 1 in 1e-16.
   CHECK_THAT(stepFromMotion(boosted, 0.0, wide), WithinRel(stepFromMotion(rest, 0.0, wide), 1e-12));
-  std::vector<Pair> pairs{{0, 1}, {1, 2}, {3, 40}};
-  CHECK_THAT(stepFromApproach(boosted, pairs, openSeparation, wide),
-             WithinRel(stepFromApproach(rest, pairs, openSeparation, wide), 1e-11));
+}
+
+// Seen to fail: a taken in the axes of space.
+TEST_CASE("A common fall changes no step, unless something stands still") {
+  Bodies<double> rest;
+  Bodies<double> falling;
+  const CounterRandom random(6);
+  const Vec g(0, 0, -9.81);
+  for (std::uint64_t i = 0; i < 50; ++i) {
+    const Vec x = 10 * random.direction(10 * i);
+    const Vec v = random.direction(10 * i + 1);
+    const Vec a = random.uniform(10 * i + 7, 0.1, 3.0) * random.direction(10 * i + 2);
+    add(rest, x, v, a, 0.1);
+    add(falling, x, v, a + g, 0.1);
+  }
+  CHECK_THAT(stepFromMotion(falling, 0.0, wide), WithinRel(stepFromMotion(rest, 0.0, wide), 1e-12));
+  CHECK(stepFromMotion(falling, 0.0, wide, true) < 0.9 * stepFromMotion(rest, 0.0, wide, true));
 }
 
 TEST_CASE("Steps keep to their limits, and to the longest where nothing is to be resolved") {
@@ -73,33 +85,32 @@ TEST_CASE("Steps keep to their limits, and to the longest where nothing is to be
   Bodies<double> bodies;
   CHECK(stepFromMotion(bodies, 0.0, limits) == 0.1);  // no body
   add(bodies, {0, 0, 0}, {5, 0, 0}, {0, 0, 0}, 0.1);
-  CHECK(stepFromMotion(bodies, 0.0, limits) == 0.1);  // no acceleration
+  CHECK(stepFromMotion(bodies, 0.0, limits) == 0.1);  // alone: nothing to measure its motion against
+  CHECK(stepFromMotion(bodies, 0.0, limits, true) == 0.1 / 4 / 5);
   bodies[0].acceleration() = Vec(1e12, 0, 0);
-  CHECK(stepFromMotion(bodies, 0.0, limits) == 1e-3);
+  CHECK(stepFromMotion(bodies, 0.0, limits, true) == 1e-3);
   bodies[0].setFixed(true);
-  CHECK(stepFromMotion(bodies, 0.0, limits) == 0.1);
-  const std::vector<Pair> none;
-  CHECK(stepFromApproach(bodies, none, openSeparation, limits) == 0.1);
+  CHECK(stepFromMotion(bodies, 0.0, limits, true) == 0.1);
 }
 
-TEST_CASE("A fast approach shortens the step, to a quarter of the time to contact") {
+TEST_CASE("No sphere moves by more than a quarter of its radius in a step") {
   Bodies<double> bodies;
-  add(bodies, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}, 0.5);
-  add(bodies, {3, 0, 0}, {-100, 7, 0}, {0, 0, 0}, 0.25);
-  const std::vector<Pair> pairs{{0, 1}};
-  CHECK_THAT(stepFromApproach(bodies, pairs, openSeparation, wide), WithinRel(2.25 / 100 / 4, 1e-14));
-  bodies[1].position() = Vec(0.8, 0, 0);  // the gap of 0.05 is below the smaller radius
-  CHECK_THAT(stepFromApproach(bodies, pairs, openSeparation, wide), WithinRel(0.25 / 100 / 4, 1e-14));
-  bodies[1].position() = Vec(0.6, 0, 0);  // and where they overlap
-  CHECK_THAT(stepFromApproach(bodies, pairs, openSeparation, wide), WithinRel(0.25 / 100 / 4, 1e-14));
-  bodies[1].velocity() = Vec(100, 7, 0);  // parting
-  CHECK(stepFromApproach(bodies, pairs, openSeparation, wide) == wide.largest);
+  add(bodies, {-3, 0, 0}, {10, 0, 0}, {0, 0, 0}, 0.1);
+  add(bodies, {3, 0, 0}, {-10, 0, 0}, {0, 0, 0}, 0.4);
+  CHECK_THAT(stepFromMotion(bodies, 0.0, wide), WithinRel(0.1 / 4 / 10, 1e-12));
 }
 
 TEST_CASE("Coincident centres ask for no step of zero") {
   Bodies<double> bodies;
   add(bodies, {1, 1, 1}, {0, 0, 0}, {0, 0, 1}, 0.5);
   add(bodies, {1, 1, 1}, {-100, 7, 0}, {0, 0, 1}, 0.25);
-  CHECK(stepFromApproach(bodies, std::vector<Pair>{{0, 1}}, openSeparation, wide) > 0.0);
   CHECK(stepFromMotion(bodies, 0.0, wide) > 0.0);
+}
+
+// Seen to hang advanceTo(): a point without neighbours has no length, and sqrt(0 a)/a is no time.
+TEST_CASE("A point at rest in a field asks for no step of zero") {
+  Bodies<double> bodies;
+  add(bodies, {1, 1, 1}, {0, 0, 0}, {0, 0, -9.81});
+  CHECK(stepFromMotion(bodies, 0.0, wide) == wide.largest);
+  CHECK(stepFromMotion(bodies, 0.0, wide, true) == wide.largest);
 }

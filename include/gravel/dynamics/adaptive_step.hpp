@@ -3,8 +3,9 @@
 /// \file
 /// The next step from velocities and accelerations.
 ///
-/// For a body with speed v relative to the centre of mass (so that a boost changes nothing) and
-/// acceleration a, the time in which its motion changes by its own size is
+/// For a body with speed v and acceleration a, both relative to the centre of mass, so that neither a boost
+/// nor a common fall changes anything (absolute where fixed bodies or planes make rest absolute), the time in
+/// which its motion changes by its own size is
 ///   tau_i = sqrt(v^2 + a l_i) / a        the turning time v/a; sqrt(l/a) where a body starts from rest
 /// with l_i = its radius, or the softening, or a hundredth of the mean spacing, whichever is largest. The
 /// step is h = eta min(tau_i); and no sphere moves by more than a quarter of its radius in a step, so that
@@ -50,9 +51,10 @@ Scalar orderedMin(std::size_t n, std::size_t chunk, const Scalar& start, F&& f) 
 }  // namespace detail
 
 /// The step by the rules above over the movable bodies, within the limits. O(N).
+/// \param anchored something outside the bodies stands still, such as a plane
 template <Real Scalar, class Layout>
 Scalar stepFromMotion(const Bodies<Scalar, Layout>& bodies, const Scalar& softening,
-                      const StepLimits<Scalar>& limits) {
+                      const StepLimits<Scalar>& limits, bool anchored = false) {
   using std::cbrt;
   using std::sqrt;
   const std::size_t n = bodies.size();
@@ -60,32 +62,44 @@ Scalar stepFromMotion(const Bodies<Scalar, Layout>& bodies, const Scalar& soften
     return limits.largest;
   }
   Scalar mass(0);
-  Vector3<Scalar> momentum = Vector3<Scalar>::Zero();
+  Vector3<Scalar> v_cm = Vector3<Scalar>::Zero();
+  Vector3<Scalar> a_cm = Vector3<Scalar>::Zero();
   Vector3<Scalar> low = bodies[0].position();
   Vector3<Scalar> high = low;
   for (std::size_t i = 0; i < n; ++i) {
     const auto body = bodies[i];
     const Scalar m = body.mass();
     mass += m;
-    momentum += body.velocity() * m;
+    v_cm += body.velocity() * m;
+    a_cm += body.acceleration() * m;
     low = low.cwiseMin(Vector3<Scalar>(body.position()));
     high = high.cwiseMax(Vector3<Scalar>(body.position()));
+    anchored = anchored || body.isFixed();
   }
-  const Vector3<Scalar> v_cm =
-      mass > Scalar(0) ? Vector3<Scalar>(momentum / mass) : Vector3<Scalar>(Vector3<Scalar>::Zero());
+  const Scalar share = anchored || !(mass > Scalar(0)) ? Scalar(0) : Scalar(Scalar(1) / mass);
+  v_cm *= share;
+  a_cm *= share;
   const Scalar spacing = Vector3<Scalar>(high - low).norm() / Scalar(cbrt(static_cast<double>(n)));
   const Scalar floor = std::max<Scalar>(softening, spacing / Scalar(100));
-  const Scalar least =
-      detail::orderedMin(n, 2048, Scalar(limits.largest / limits.factor), [&](std::size_t i) {
-        const auto body = bodies[i];
-        const Scalar a = Vector3<Scalar>(body.acceleration()).norm();
-        if (body.isFixed() || !(a > Scalar(0))) {
-          return Scalar(limits.largest / limits.factor);
-        }
-        const Scalar l = std::max<Scalar>(body.radius(), floor);
-        const Scalar v_sq = Vector3<Scalar>(body.velocity() - v_cm).squaredNorm();
-        return Scalar(sqrt(v_sq + a * l) / a);
-      });
+  const Scalar longest = limits.largest / limits.factor;
+  const Scalar least = detail::orderedMin(n, 2048, longest, [&](std::size_t i) {
+    const auto body = bodies[i];
+    Scalar tau = longest;
+    if (body.isFixed()) {
+      return tau;
+    }
+    const Scalar r = body.radius();
+    const Scalar l = std::max<Scalar>(r, floor);
+    const Scalar a = Vector3<Scalar>(body.acceleration() - a_cm).norm();
+    const Scalar v_sq = Vector3<Scalar>(body.velocity() - v_cm).squaredNorm();
+    if (a > Scalar(0) && l > Scalar(0)) {
+      tau = std::min<Scalar>(tau, sqrt(v_sq + a * l) / a);
+    }
+    if (r > Scalar(0) && v_sq > Scalar(0)) {
+      tau = std::min<Scalar>(tau, r / (Scalar(4) * limits.factor * sqrt(v_sq)));
+    }
+    return tau;
+  });
   return std::clamp<Scalar>(limits.factor * least, limits.smallest, limits.largest);
 }
 

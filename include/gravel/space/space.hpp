@@ -172,9 +172,9 @@ class Space : public Settings<Scalar> {
   void updateAdaptiveTimeStep();
   void applyDamping();
 
-  void step(const Scalar& h, std::size_t iteration);
+  void step(Scalar h, std::size_t iteration);
   void solveContacts(const Scalar& kick);
-  void refreshForces();
+  void prepare();
   void rememberPlaces();
   bool placesChanged() const;
   Material<Scalar> pairMaterial(const CollisionContext& ctx) const;

@@ -23,6 +23,7 @@ namespace gravel {
 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::computeDynamics(std::size_t iteration) {
+  prepare();
   step(dt_, iteration);
 }
 
@@ -33,6 +34,7 @@ void Space<Scalar, Layout>::advanceTo(Scalar time) {
                    "finite, at least the present time " + detail::formatReal(time_));
   }
   while (time_ < time) {
+    prepare();
     const Scalar rest = time - time_;
     // A rest of a millionth of a step is joined to the step: it is rounding in the sum of steps.
     if (rest <= dt_ * Scalar(1.000001)) {
@@ -61,13 +63,10 @@ struct Space<Scalar, Layout>::Departure {
 };
 
 template <Real Scalar, class Layout>
-void Space<Scalar, Layout>::step(const Scalar& h, std::size_t iteration) {
+void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration) {
   if (!bodies_.empty()) {
-    bodies_.validateAll();
-    contact_.checkMaterials(bodies_);
     ledgerOpen_ = true;
     previous_dt_ = h;
-    refreshForces();
     const auto forces = [&](const Scalar& passed) {
       force_.evaluate(bodies_, getG(), this->config_.softening, Scalar(time_ + passed), profiler_);
     };
@@ -75,7 +74,7 @@ void Space<Scalar, Layout>::step(const Scalar& h, std::size_t iteration) {
     const Departure departure{this};
     const auto arrival = [&] {
       contact_.wrap(bodies_, Scalar(time_ + h));
-      buildCollisionGraph();
+      contact_.detect(bodies_, this->config_, Scalar(time_ + h), h, profiler_);
       contact_.separate(bodies_, this->config_, Scalar(time_ + h), profiler_);
     };
     {
@@ -107,14 +106,18 @@ void Space<Scalar, Layout>::step(const Scalar& h, std::size_t iteration) {
   logSystemEnergy(iteration);
 }
 
-/// Forces of the present places, if a body, its place or its mass was changed since they were evaluated.
+/// Checks all bodies; then forces, contacts and the step of the present places, if a body, its place or its
+/// mass was changed since they were found.
 template <Real Scalar, class Layout>
-void Space<Scalar, Layout>::refreshForces() {
+void Space<Scalar, Layout>::prepare() {
+  bodies_.validateAll();
+  contact_.checkMaterials(bodies_);
   if (!forcesValid_ || placesChanged()) {
     applyGravity();
     buildCollisionGraph();
     rememberPlaces();
     hookPower_ = force_.hookPower(bodies_);
+    updateAdaptiveTimeStep();
   }
 }
 
@@ -150,7 +153,7 @@ void Space<Scalar, Layout>::applyGravity() {
 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::buildCollisionGraph() {
-  contact_.detect(bodies_, this->config_, time_, previous_dt_, profiler_);
+  contact_.detect(bodies_, this->config_, time_, dt_, profiler_);
 }
 
 template <Real Scalar, class Layout>
@@ -183,7 +186,7 @@ void Space<Scalar, Layout>::updateAdaptiveTimeStep() {
   }
   const Profiler::Scope scope(profiler_, Phase::TimeStep);
   const StepLimits<Scalar> limits{c.timeStepFactor, c.minTimeStep, c.timeStep};
-  dt_ = stepFromMotion(bodies_, c.softening, limits);
+  dt_ = stepFromMotion(bodies_, c.softening, limits, !contact_.planes.empty());
 }
 
 template <Real Scalar, class Layout>
