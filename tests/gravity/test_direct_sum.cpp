@@ -51,7 +51,8 @@ void checkAgainstOracle(const PointMasses<S>& points, S G, S softening) {
 TEMPLATE_TEST_CASE("accelerations and energy equal the sum over pairs to rounding, for any number of bodies",
                    "", float, double) {
   using S = TestType;
-  for (const std::size_t n : {0, 1, 2, 3, 7, 8, 9, 15, 16, 17, 63, 64, 65, 127, 130, 193, 1023, 1025}) {
+  for (const std::size_t n : std::initializer_list<std::size_t>{0, 1, 2, 3, 7, 8, 9, 15, 16, 17, 63, 64, 65,
+                                                                127, 130, 193, 1023, 1025}) {
     CAPTURE(n);
     checkAgainstOracle(randomMasses<S>(n, 60 + n), S(1), S(0));
     checkAgainstOracle(randomMasses<S>(n, 60 + n), S(6.6743e-11), S(0.05));
@@ -89,7 +90,7 @@ TEMPLATE_TEST_CASE("the total force vanishes: |sum m a| <= 1e-15 sum m |a| in do
                    long double) {
   using S = TestType;
   const long double bound = 1e-15L / 0x1p-52L * static_cast<long double>(std::numeric_limits<S>::epsilon());
-  for (const std::size_t n : {2, 3, 5, 8, 9, 31, 64, 65, 200, 777, 3000}) {
+  for (const std::size_t n : std::initializer_list<std::size_t>{2, 3, 5, 8, 9, 31, 64, 65, 200, 777, 3000}) {
     if (std::is_same_v<S, long double> && n > 777) {
       continue;
     }
@@ -265,7 +266,7 @@ TEST_CASE("forces do not depend on where the origin is") {
 
 TEST_CASE("an object can be used again for other sizes") {
   DirectSum<double> sum;
-  for (const std::size_t n : {100, 7, 0, 300, 1}) {
+  for (const std::size_t n : std::initializer_list<std::size_t>{100, 7, 0, 300, 1}) {
     const auto points = randomMasses<double>(n, 71 + n);
     std::vector<Vector3<double>> out(n, Vector3<double>(9, 9, 9));
     sum.accelerations(points.positions, points.masses, 1.0, 0.0, out);
