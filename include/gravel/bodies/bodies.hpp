@@ -4,6 +4,7 @@
 /// The container of bodies: a storage, stable ids, and the checks at the door.
 
 #include <gravel/bodies/proxy.hpp>
+#include <gravel/core/parallel.hpp>
 
 #include <algorithm>
 #include <optional>
@@ -187,7 +188,7 @@ class Bodies {
   /// Looks at every body: the guard against values written through proxies or by a user's own code.
   /// \throws std::invalid_argument naming body, field, value and what is allowed
   void validateAll() const {
-    for (std::size_t i = 0; i < size(); ++i) {
+    parallelFor(size(), 4096, [&](std::size_t i) {
       const auto body = (*this)[i];
       const Scalar m = body.mass();
       const Scalar r = body.radius();
@@ -202,7 +203,7 @@ class Bodies {
         validate(body.load(), who);
         checkFactor(k, who);
       }
-    }
+    });
   }
 
   auto positions() { return Column<Storage, fields::Position>(storage_); }

@@ -136,14 +136,17 @@ bool Space<Scalar, Layout>::placesChanged() const {
   if (places_.size() != n()) {
     return true;
   }
-  for (std::size_t i = 0; i < n(); ++i) {
-    const auto body = bodies_[i];
-    if (!(places_[i].template head<3>() == body.position().array()).all() ||
-        !(places_[i][3] == body.mass())) {
-      return true;
+  const auto moved = orderedSum(n(), 4096, std::size_t{0}, [&](std::size_t begin, std::size_t end) {
+    std::size_t count = 0;
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto body = bodies_[i];
+      const bool same =
+          (places_[i].template head<3>() == body.position().array()).all() && places_[i][3] == body.mass();
+      count += same ? 0 : 1;
     }
-  }
-  return false;
+    return count;
+  });
+  return moved > 0;
 }
 
 template <Real Scalar, class Layout>
