@@ -134,9 +134,8 @@ class ContactStage {
   }
 
   /// Solves all contacts together on the present velocities. Adds to the report of the step.
-  /// \param h    [s] length of the step
-  /// \param kick [s] for which the present accelerations have just acted on the velocities
-  void solve(Bodies& bodies, const Config& config, const Scalar& h, const Scalar& kick, Profiler& profiler) {
+  /// \param h [s] length of the step
+  void solve(Bodies& bodies, const Config& config, const Scalar& h, Profiler& profiler) {
     if (contacts_.empty()) {
       profiler.skip(Phase::ContactSolve, "no contacts");
       solver_.forget();
@@ -150,6 +149,10 @@ class ContactStage {
     settings.maxIterations = static_cast<int>(config.contactIterations);
     solver_.setSettings(settings);
     const ContactReport<Scalar> half = solver_.solve(bodies, h);
+    acted_ = half.iterations > 0;
+    if (!acted_) {
+      solver_.forget();  // its impulses are those of the solve before
+    }
     report_.contacts = half.contacts;
     report_.colours = half.colours;
     report_.iterations += half.iterations;
@@ -157,7 +160,6 @@ class ContactStage {
     report_.restitutionLoss += half.restitutionLoss;
     report_.frictionLoss += half.frictionLoss;
     report_.driftWork += half.driftWork;
-    bookKick(bodies, kick);
   }
 
   /// A new step: its report starts empty.
@@ -167,7 +169,25 @@ class ContactStage {
   }
 
   /// The first half of the step is solved: its impulses are kept for impulses().
-  void endFirstHalf() { firstHalf_ = solver_.memory(); }
+  /// \param kick [s] for which the present accelerations acted on the velocities before that
+  void endFirstHalf(const ForceStage<Scalar, Layout>& force, const Bodies& bodies, const Scalar& kick) {
+    if (acted_) {
+      bookKick(force, bodies, kick);
+      firstHalf_ = solver_.memory();
+    }
+  }
+
+  /// The bodies stand in a new order.
+  void renumber(const Bodies& bodies) {
+    for (Contact<Scalar>& c : contacts_) {
+      c.first = static_cast<std::uint32_t>(bodies.indexOf(BodyId{c.key1}));
+      if (c.second != staticPartner) {
+        c.second = static_cast<std::uint32_t>(bodies.indexOf(BodyId{c.key2}));
+      }
+    }
+    coloured_ = false;
+    moved_ = false;
+  }
 
   /// Impulses of both halves of the step [N s], in the order of contacts(). A contact that ended in the drift
   /// is not among them. O(contacts).
@@ -212,21 +232,23 @@ class ContactStage {
     }
   }
 
-  /// What rests, rolls or slides feels the contact's force F = J/kick and its accelerations a at the same
-  /// time. Over that time the force does the work F.(u_0 + u_1) kick/2 with u_0 the velocity of contact
-  /// before the kick, where the solver, which sees u_0 + a kick, books J.(u_0 + a kick + u_1)/2. A blow is
-  /// short, and its loss stays as booked.
-  void bookKick(const Bodies& bodies, const Scalar& kick) {
-    const auto accelerationOf = [&](std::uint32_t i) -> Vector3<Scalar> {
-      return i == staticPartner || bodies[i].isFixed() ? Vector3<Scalar>(Vector3<Scalar>::Zero())
-                                                       : Vector3<Scalar>(bodies[i].acceleration());
+  /// The share of the first half step's impulses J in the work of gravity and the field over the step. Kicks
+  /// do the work m a.(v before + v after) kick/2, and the drift takes it out of the potential at the velocity
+  /// in between. What J changes in the drift and in all later kicks, but not in the first one, leaves
+  /// -J.a kick: with it booked, what rests or rolls loses nothing over a step, to rounding, and the ledger
+  /// closes to the order of the integrator. A hook's work is a mean over both ends and needs no share.
+  void bookKick(const ForceStage<Scalar, Layout>& force, const Bodies& bodies, const Scalar& kick) {
+    const auto fall = [&](std::uint32_t i) -> Vector3<Scalar> {
+      return i == staticPartner
+                 ? Vector3<Scalar>(Vector3<Scalar>::Zero())
+                 : Vector3<Scalar>(force.conservativeForce(bodies, i) * bodies[i].inverseMass());
     };
     const std::span<const ContactImpulse<Scalar>> impulses = solver_.impulses();
     for (std::size_t k = 0; k < impulses.size(); ++k) {
       const ContactImpulse<Scalar>& j = impulses[k];
-      if (j.normal > Scalar(0) && !j.impact) {
+      if (j.normal > Scalar(0)) {
         const Contact<Scalar>& c = contacts_[k];
-        const Vector3<Scalar> dv = (accelerationOf(c.second) - accelerationOf(c.first)) * (kick / Scalar(2));
+        const Vector3<Scalar> dv = (fall(c.second) - fall(c.first)) * kick;
         report_.restitutionLoss += j.normal * c.normal.dot(dv);
         report_.frictionLoss += j.tangential.dot(dv);
       }
@@ -287,6 +309,7 @@ class ContactStage {
   std::vector<StoredImpulse<Scalar>> firstHalf_;
   ContactReport<Scalar> report_;
   bool moved_ = false;
+  bool acted_ = false;     // the last solve changed velocities
   bool coloured_ = false;  // solver_ knows the present contacts
 };
 

@@ -173,7 +173,6 @@ class Space : public Settings<Scalar> {
   void applyDamping();
 
   void step(Scalar h, std::size_t iteration);
-  void solveContacts(const Scalar& kick);
   void prepare();
   void rememberPlaces();
   bool placesChanged() const;

@@ -67,8 +67,12 @@ void Space<Scalar, Layout>::removeBody(BodyId id) {
 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::reorderBodies() {
+  forcesValid_ = forcesValid_ && !placesChanged();
   bodies_.reorder(mortonOrder(bodies_.positions()));
-  forcesValid_ = false;
+  if (forcesValid_) {  // forces moved along with their bodies, and contacts know theirs by id
+    contact_.renumber(bodies_);
+    rememberPlaces();
+  }
 }
 
 template <Real Scalar, class Layout>

@@ -57,8 +57,8 @@ struct Space<Scalar, Layout>::Departure {
   Space* space;
   explicit operator bool() const { return space->contactCount() > 0; }
   void operator()(const Scalar& kick) const {
-    space->solveContacts(kick);
-    space->contact_.endFirstHalf();
+    space->resolveCollisions();
+    space->contact_.endFirstHalf(space->force_, space->bodies_, kick);
   }
 };
 
@@ -87,7 +87,7 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration) {
       const Scalar power = force_.hookPower(bodies_);
       left_.work -= (hookPower_ + power) * h / Scalar(2);
     }
-    solveContacts(Scalar(traitsOf(this->config_.integrator).weights.back()) * h / Scalar(2));
+    resolveCollisions();
     left_.restitution += contact_.report().restitutionLoss;
     left_.friction += contact_.report().frictionLoss;
     applyDamping();
@@ -160,13 +160,8 @@ void Space<Scalar, Layout>::buildCollisionGraph() {
 }
 
 template <Real Scalar, class Layout>
-void Space<Scalar, Layout>::solveContacts(const Scalar& kick) {
-  contact_.solve(bodies_, this->config_, previous_dt_, kick, profiler_);
-}
-
-template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::resolveCollisions() {
-  solveContacts(Scalar(0));
+  contact_.solve(bodies_, this->config_, previous_dt_, profiler_);
 }
 
 template <Real Scalar, class Layout>
