@@ -1,5 +1,7 @@
 #include "picture.hpp"
 
+#ifdef GRAVEL_RUN_PICTURES
+
 #include <algorithm>
 #include <fstream>
 
@@ -68,7 +70,7 @@ View viewOf(const Scene& scene, const Space<double>& space) {
 
 }  // namespace
 
-void writePicture(const std::filesystem::path& path, const Scene& scene, const Space<double>& space,
+bool writePicture(const std::filesystem::path& path, const Scene& scene, const Space<double>& space,
                   const Trails& trails) {
   Picture picture;
   picture.view = viewOf(scene, space);
@@ -78,8 +80,8 @@ void writePicture(const std::filesystem::path& path, const Scene& scene, const S
     const std::uint64_t id = toInteger(body.id());
     const SceneBody* known = sceneBody(scene, body.id());
     const SceneBody look = known != nullptr ? *known : SceneBody{};
-    DrawnSphere sphere{body.position(), body.radius(), Quaternion<double>(body.orientation()),
-                       look.colour,     look.surface,  static_cast<std::uint32_t>(id) * 7919U};
+    DrawnSphere sphere{body.position(), body.radius(), Quaternion<double>(body.orientation()), look.colour,
+                       look.surface};
     if (look.surface == Surface::Rock) {
       const CounterRandom random(id);
       const double shade = random.uniform(0, 0.75, 1.25);
@@ -111,6 +113,22 @@ void writePicture(const std::filesystem::path& path, const Scene& scene, const S
   if (made == 0 || !file) {
     throw std::runtime_error("cannot write " + path.string());
   }
+  return true;
 }
 
 }  // namespace gravel::runner
+
+#else
+
+#include <cstdio>
+
+namespace gravel::runner {
+
+bool writePicture(const std::filesystem::path&, const Scene&, const Space<double>&, const Trails&) {
+  std::fputs("no picture: built without tachyon (Debian, Ubuntu: libtachyon-mt-0-dev)\n", stderr);
+  return false;
+}
+
+}  // namespace gravel::runner
+
+#endif

@@ -12,8 +12,9 @@ namespace gravel::runner {
 /// The places of every body at some times of the run.
 using Trails = std::vector<std::vector<Vector3<double>>>;
 
+/// False, and a line on stderr that says so, if the runner was built without tachyon.
 /// \throws std::runtime_error if the file cannot be written
-void writePicture(const std::filesystem::path& path, const Scene& scene, const Space<double>& space,
+bool writePicture(const std::filesystem::path& path, const Scene& scene, const Space<double>& space,
                   const Trails& trails);
 
 }  // namespace gravel::runner

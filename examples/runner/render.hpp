@@ -1,12 +1,12 @@
 #pragma once
 
 /// \file
-/// A small ray tracer for spheres and planes: sunlight with shadows, skylight with occlusion, and a rock,
-/// smooth or striped surface that turns with the body. The same picture for any number of threads.
+/// Spheres, planes and paths as the tachyon ray tracer draws them: sunlight with shadows and skylight with
+/// occlusion.
 
 #include <gravel/core/types.hpp>
 
-#include <array>
+#include <cstdint>
 #include <vector>
 
 namespace gravel::runner {
@@ -21,7 +21,6 @@ struct DrawnSphere {
   Quaternion<double> orientation;
   Colour colour;
   Surface surface;
-  std::uint32_t seed;  ///< sets apart the patterns of two rocks
 };
 
 /// The face of the half-space normal.x >= offset, seen from its free side; bounded by the other planes.
@@ -56,7 +55,8 @@ struct Picture {
   View view;
 };
 
-/// Rows from the top, three bytes a pixel.
+/// Rows from the top, three bytes a pixel. One thread: tachyon's random numbers, and with them the picture,
+/// depend on the number of threads. Not to be called from two threads at once.
 std::vector<std::uint8_t> render(const Picture& picture);
 
 }  // namespace gravel::runner
