@@ -25,8 +25,8 @@ struct PairLaw {
     }
   }
 
-  /// w in a_i = G m_j w (x_j - x_i): s^(-3/2) [m^-3]. Errs by 2 units in the last place; packed float by
-  /// up to 4, as Eigen's float square root is an estimate with one Newton step.
+  /// w in a_i = G m_j w (x_j - x_i): s^(-3/2) [m^-3]. Errs by 2 units in the last place; lanes by up to
+  /// 4 where Eigen's packed square root is an estimate with Newton steps (float, and double with AVX-512).
   template <class T>
   static T accelerationFactor(const T& s) {
     using std::sqrt;
