@@ -2,13 +2,16 @@
 
 add_library(gravel_warnings INTERFACE)
 target_compile_options(gravel_warnings INTERFACE
-  $<$<CXX_COMPILER_ID:GNU,Clang,AppleClang>:-Wall;-Wextra;-Wpedantic;-Wshadow;-Wconversion;-Werror>)
+  $<$<CXX_COMPILER_ID:GNU,Clang,AppleClang>:-Wall;-Wextra;-Wpedantic;-Wshadow;-Wconversion;-Werror>
+  # g++ 12 takes the undefined sources in its own AVX-512 header for a fault of the including code.
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-error=uninitialized;-Wno-error=maybe-uninitialized>)
 
 # gravel_own = the library + warnings + the sanitizers asked for.
 add_library(gravel_own INTERFACE)
 target_link_libraries(gravel_own INTERFACE gravel::gravel gravel_warnings)
 
-set(gravel_test_environment "")
+# ctest runs as many programs as there are processors: threads that wait must not spin.
+set(gravel_test_environment "OMP_WAIT_POLICY=passive")
 if(GRAVEL_SANITIZE)
   foreach(sanitizer IN LISTS GRAVEL_SANITIZE)
     if(NOT sanitizer MATCHES "^(address|undefined|leak|thread)$")
@@ -26,6 +29,9 @@ if(GRAVEL_SANITIZE)
   if("address" IN_LIST GRAVEL_SANITIZE)
     list(APPEND gravel_test_environment "ASAN_OPTIONS=detect_stack_use_after_return=1:strict_init_order=1")
     list(APPEND gravel_test_environment "UBSAN_OPTIONS=print_stacktrace=1")
+    # LLVM's OpenMP loses a block when the number of threads changes; a program without gravel shows the same.
+    list(APPEND gravel_test_environment
+      "LSAN_OPTIONS=suppressions=${CMAKE_CURRENT_LIST_DIR}/leaks_elsewhere.txt:print_suppressions=0")
   endif()
 endif()
 
