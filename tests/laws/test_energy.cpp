@@ -1,0 +1,187 @@
+#include "laws/laws.hpp"
+#include "scenes/scenes.hpp"
+#include "support/catch.hpp"
+
+using namespace gravel;
+using namespace gravel::test;
+
+namespace {
+
+double kineticOf(const Space<double>& space) {
+  const auto [k, r, u] = space.calculateSystemEnergy();
+  return k + r;
+}
+
+/// n spheres thrown at random into a ball that holds them several times over: overlaps, spins, all speeds.
+void fill(Space<double>& space, std::size_t n, double fraction, std::uint64_t seed) {
+  scenes::Sequence random(seed);
+  const double size = std::cbrt(static_cast<double>(n) / fraction) * 0.1;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double r = random.uniform(0.05, 0.15);
+    space.addBody(
+        ball(random.inBall(size), random.normalVector(), r, 1e3 * r * r * r, 10 * random.normalVector()));
+  }
+}
+
+}  // namespace
+
+// Contacts alone: whatever the coefficients, no step adds kinetic energy. Each blow may round up by some ulp.
+// Seen to fail: restitution from the target of separating contacts left at 0 with friction (Kane's paradox),
+// the guard of contact_energy.hpp switched off.
+TEST_CASE("Kinetic energy never grows in dense random collisions, whatever the coefficients") {
+  const CounterRandom random(23);
+  for (std::uint64_t k = 0; k < 12; ++k) {
+    SimulationConfig<double> config = plain(2e-3);
+    config.coeffRestitution = k == 0 ? 1.0 : k == 1 ? 0.0 : random.uniform(10 * k);
+    config.coeffFriction = k == 2 ? 0.0 : random.uniform(10 * k + 1);
+    config.coeffStaticFriction = config.coeffFriction + 0.5 * random.uniform(10 * k + 2);
+    config.tangentialRestitution = k % 3 == 0 ? random.uniform(10 * k + 3) : 0.0;
+    Space<double> space(config);
+    fill(space, 300, 0.5, k);
+    double before = kineticOf(space);
+    const double start = before;
+    double worst = 0;
+    std::size_t contacts = 0;
+    for (std::size_t i = 0; i < 100; ++i) {
+      space.computeDynamics(i);
+      const double now = kineticOf(space);
+      worst = std::max(worst, now / before - 1);
+      before = now;
+      contacts += space.contactCount();
+    }
+    CAPTURE(k, config.coeffRestitution, config.coeffFriction, config.tangentialRestitution, contacts);
+    CHECK(contacts > 3000);
+    CHECK(worst <= 1e-14);
+    if (config.coeffRestitution == 1.0 && config.coeffFriction == 0.0) {
+      CHECK_THAT(before, WithinRel(start, 1e-12));
+    }
+  }
+}
+
+TEST_CASE("Overlap alone makes no motion: a heap at rest without forces stays at rest, and comes apart") {
+  Space<double> space(plain(1e-2));
+  fill(space, 200, 2.0, 3);
+  for (std::size_t i = 0; i < space.n(); ++i) {
+    space.body(i).velocity() = Vec(0, 0, 0);
+    space.body(i).angularVelocity() = Vec(0, 0, 0);
+  }
+  const Vec centre = space.conserved().centreOfMass;
+  space.computeDynamics(0);
+  const auto deepest = [&] {
+    double most = 0;
+    for (const Contact<double>& c : space.contacts()) {
+      most = std::max(most, -c.gap);
+    }
+    return most;
+  };
+  const double first = deepest();
+  CHECK(first > 0.02);
+  advance(space, 300);
+  CHECK(deepest() < 1e-3 * first);
+  CHECK(kineticOf(space) < 1e-25);
+  CHECK((space.conserved().centreOfMass - centre).norm() < 1e-13);
+}
+
+TEST_CASE("A pair half inside one another comes apart no faster than it came, but for the correction") {
+  SimulationConfig<double> config = plain(1e-3);
+  config.coeffRestitution = 0.5;
+  Space<double> space(config);
+  space.addBody(ball({0, 0, 0}, {1, 0, 0}, 0.5));
+  space.addBody(ball({0.5, 0, 0}, {-1, 0, 0}, 0.5));
+  advance(space, 200);
+  CHECK_THAT(space.body(1).velocity()[0] - space.body(0).velocity()[0], WithinAbs(1.0, 1e-14));
+  CHECK(space.contactCount() == 0);
+}
+
+// A frictionless elastic gas of 4000 blows: the sum of m v^2 is kept to the rounding of each.
+TEST_CASE("An elastic gas keeps its energy through many blows") {
+  SimulationConfig<double> config = plain(5e-3);
+  config.coeffRestitution = 1.0;
+  config.contactTolerance = 1e-15;  // of the sweeps, where three and more touch at once; 1e-6 loses 1e-8 here
+  config.contactIterations = 1000;
+  Space<double> space(config);
+  const double side = scenes::gasBoxLength(200, 0.2);
+  space.setDomain(Domain<double>::periodic({side, side, side}));
+  for (const Body<double>& body : scenes::randomGas<double>(200, 0.2)) {
+    space.addBody(body);
+  }
+  const double start = kineticOf(space);
+  std::size_t contacts = 0;
+  double worst = 0;
+  for (std::size_t i = 0; i < 2000; ++i) {
+    space.computeDynamics(i);
+    contacts += space.contactCount();
+    worst = std::max(worst, std::abs(kineticOf(space) / start - 1));
+  }
+  CAPTURE(contacts);
+  CHECK(contacts > 2000);
+  CHECK(worst <= 1e-12);
+  CHECK(space.conserved().momentum.norm() < 1e-11);
+}
+
+namespace {
+
+/// Largest error of the ledger's sum in a run, and its error at the end.
+template <class Scene>
+std::pair<double, double> ledgerError(double dt, double time, Scene&& scene) {
+  SimulationConfig<double> config = plain(dt);
+  config.G = 1.0;
+  config.coeffFriction = 0.3;
+  config.coeffStaticFriction = 0.4;
+  config.coeffRestitution = 0.5;
+  config.linearDamping = 0.1;
+  Space<double> space(config);
+  scene(space);
+  const double start = space.energyLedger().total();
+  double worst = 0;
+  bool met = false;
+  while (space.time() < time) {
+    space.computeDynamics(0);
+    met = met || space.contactCount() > 0;
+    worst = std::max(worst, std::abs(space.energyLedger().total() - start));
+  }
+  CHECK(met);
+  return {worst, std::abs(space.energyLedger().total() - start)};
+}
+
+}  // namespace
+
+// With forces the sum is as good as the integrator: second order, both sides, through a blow as well, since
+// what blows and moved positions do is booked from impulses and forces. Seen to fail: the correction's work
+// left out, and the losses of the first half step booked without the kick's share (both first order).
+TEST_CASE("With gravity, friction and blows the ledger closes to the second order of the step") {
+  // Two spheres fall towards each other, off centre, meet, rub, and part or fall back on each other.
+  const auto meeting = [](Space<double>& space) {
+    space.addBody(ball({-1.0, -0.1, 0}, {0.2, 0.1, 0}, 0.3, 1.0, {0, 0, 1}));
+    space.addBody(ball({1.0, 0.1, 0}, {-0.2, 0, 0.1}, 0.3, 2.0, {1, 0, 0}));
+  };
+  std::vector<double> errors;
+  for (const double dt : {4e-3, 2e-3, 1e-3, 5e-4}) {
+    errors.push_back(ledgerError(dt, 2.5, meeting).first);
+  }
+  CAPTURE(errors);
+  // 1.9e-4, 4.9e-5, 1.2e-5, 3.1e-6 J of 2.3 J that blows take.
+  CHECK_THAT(std::log2(errors.front() / errors.back()) / 3, WithinAbs(2.0, 0.1));
+  CHECK(errors.front() > 1e-5);
+  CHECK(errors.front() < 1e-3);
+}
+
+TEST_CASE(
+    "A pair that rests on each other and turns as one body keeps energy, momentum and ledger to rounding") {
+  SimulationConfig<double> config = plain(4e-3);
+  config.G = 1.0;
+  config.coeffFriction = 0.5;
+  config.coeffStaticFriction = 0.8;
+  Space<double> space(config);
+  const double w = 0.5 * std::sqrt(2.0);  // half of what parts them
+  space.addBody(ball({-0.5, 0, 0}, {0, -0.5 * w, 0}, 0.5, 1.0, {0, 0, w}));
+  space.addBody(ball({0.5, 0, 0}, {0, 0.5 * w, 0}, 0.5, 1.0, {0, 0, w}));
+  const EnergyLedger<double> before = space.energyLedger();
+  const double spin = space.conserved().angularMomentum[2];
+  advance(space, 5000);  // twenty time units: three turns
+  const EnergyLedger<double> after = space.energyLedger();
+  CHECK_THAT(after.mechanical(), WithinAbs(before.mechanical(), 1e-5));  // the gap of a G m h^2 / R^2
+  CHECK_THAT(after.total(), WithinAbs(before.total(), 1e-5));
+  CHECK_THAT(space.conserved().angularMomentum[2], WithinRel(spin, 1e-11));
+  CHECK_THAT(space.body(0).angularVelocity()[2], WithinRel(w, 1e-4));
+}

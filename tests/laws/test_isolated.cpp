@@ -1,0 +1,113 @@
+#include "laws/laws.hpp"
+#include "scenes/scenes.hpp"
+#include "support/catch.hpp"
+
+using namespace gravel;
+using namespace gravel::test;
+
+namespace {
+
+/// A cloud of touching, spinning, rubbing grains under their own gravity. Total mass about 1, G = 1.
+Space<double> cloud(std::size_t n, double dt, double friction, double restitution, double G) {
+  SimulationConfig<double> config = plain(dt);
+  config.G = G;
+  config.coeffFriction = friction;
+  config.coeffStaticFriction = 1.5 * friction;
+  config.coeffRestitution = restitution;
+  Space<double> space(config);
+  scenes::CloudOptions options;
+  options.count = n;
+  options.radius = 1.0;
+  const double r = 0.55 / std::cbrt(static_cast<double>(n));
+  options.bodyRadius = {0.5 * r, r};
+  options.density = {1.0, 2.0};
+  options.velocityDispersion = 0.3;
+  options.bodySpin = 1.0;
+  for (const Body<double>& body : scenes::rubbleCloud<double>(options)) {
+    space.addBody(body);
+  }
+  return space;
+}
+
+struct Sizes {
+  double momentum = 0;  ///< sum m |v|
+  double angular = 0;   ///< sum m |x||v| + I |w|
+};
+
+Sizes sizesOf(const Space<double>& space) {
+  Sizes s;
+  for (std::size_t i = 0; i < space.n(); ++i) {
+    const auto b = space.body(i);
+    s.momentum += b.mass() * b.velocity().norm();
+    s.angular +=
+        b.mass() * b.velocity().norm() * b.position().norm() + b.inertia() * b.angularVelocity().norm();
+  }
+  return s;
+}
+
+}  // namespace
+
+// Action is minus reaction, pair by pair, to the rounding of each addition.
+// Seen to fail: a force that lacks one body's reaction.
+TEST_CASE("Gravity through the space leaves no net force") {
+  Space<double> space = cloud(700, 1e-4, 0.0, 1.0, 1.0);
+  advance(space, 1);
+  Vec sum = Vec::Zero();
+  double size = 0;
+  for (std::size_t i = 0; i < space.n(); ++i) {
+    const auto body = space.body(i);
+    sum += Vec(body.acceleration()) * body.mass();
+    size += body.acceleration().norm() * body.mass();
+    CHECK(Vec(body.force()) == Vec(body.acceleration() * body.mass()));
+  }
+  CHECK(sum.norm() <= 1e-15 * size);
+  CHECK(size > 0.01);
+}
+
+// Each blow keeps both to a few ulp of what it exchanges; contacts and kicks of 2000 steps round at random.
+// Without positional correction: moving a pair apart by d across its relative velocity v changes the angular
+// momentum by m* d x v. Seen to fail: friction's torque with the radius in place of the arm (by 1e-6).
+TEST_CASE("Momentum and angular momentum are kept through gravity, blows, friction and spin") {
+  for (const bool corrected : {false, true}) {
+    Space<double> space = cloud(150, 2e-3, 0.5, 0.3, 1.0);
+    space.setPositionalCorrectionFactor(corrected ? 0.4 : 0.0);
+    const ConservedQuantities<double> before = space.conserved();
+    Sizes sizes = sizesOf(space);
+    std::size_t contacts = 0;
+    for (std::size_t i = 0; i < 2000; ++i) {
+      space.computeDynamics(i);
+      contacts += space.contactCount();
+    }
+    const Sizes end = sizesOf(space);
+    sizes.momentum = std::max(sizes.momentum, end.momentum);
+    sizes.angular = std::max(sizes.angular, end.angular);
+    const ConservedQuantities<double> after = space.conserved();
+    const double turned = (after.angularMomentum - before.angularMomentum).norm() / sizes.angular;
+    CAPTURE(corrected, contacts, turned);
+    CHECK(contacts > 2000);
+    CHECK((after.momentum - before.momentum).norm() <= 1e-13 * sizes.momentum);
+    CHECK((after.centreOfMass - before.centreOfMass).norm() <= 1e-12);
+    CHECK(turned <= (corrected ? 1e-3 : 1e-11));  // reached with correction: 5e-5
+  }
+}
+
+// Without gravity nothing is left to the error of the integration: what contacts, friction and damping take
+// is booked from the impulses, and the sum of 200 steps rounds by 1e-16 of the energy each.
+TEST_CASE("The ledger closes to rounding without gravity") {
+  Space<double> space = cloud(400, 5e-3, 0.4, 0.7, 0.0);
+  space.setLinearDamping(0.1);
+  space.setAngularDamping(0.2);
+  const double start = space.energyLedger().total();
+  double worst = 0;
+  for (std::size_t i = 0; i < 400; ++i) {
+    space.computeDynamics(i);
+    worst = std::max(worst, std::abs(space.energyLedger().total() / start - 1));
+  }
+  const EnergyLedger<double> e = space.energyLedger();
+  CAPTURE(e.restitution, e.friction, e.damping, e.correction);
+  CHECK(e.restitution > 1e-3 * start);
+  CHECK(e.friction > 1e-4 * start);
+  CHECK(e.damping > 1e-3 * start);
+  CHECK(e.correction == 0);  // nothing to lift bodies against
+  CHECK(worst <= 1e-13);
+}

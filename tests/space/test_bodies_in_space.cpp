@@ -1,0 +1,249 @@
+#include "support/catch.hpp"
+#include <gravel/space/space.hpp>
+
+#include <limits>
+
+using namespace gravel;
+using namespace gravel::test;
+
+namespace {
+
+using Vec = Vector3<double>;
+
+SimulationConfig<double> quiet() {
+  SimulationConfig<double> config;
+  config.G = 0.0;
+  config.adaptiveTimeStep = false;
+  return config;
+}
+
+Body<double> at(const Vec& x, double radius = 0.5) {
+  Body<double> body;
+  body.position = x;
+  body.radius = radius;
+  return body;
+}
+
+}  // namespace
+
+TEST_CASE("An index that is no body's is refused with the index and the number of bodies") {
+  Space<double> space(quiet());
+  CHECK_THROWS_AS(space.body(0), std::out_of_range);
+  space.addBody(at({0, 0, 0}));
+  space.addBody(at({5, 0, 0}));
+  const Space<double>& view = space;
+  CHECK_NOTHROW(space.body(1));
+  CHECK_THROWS_WITH(space.body(2), ContainsSubstring("index is 2") && ContainsSubstring("n() = 2"));
+  CHECK_THROWS_AS(view.body(std::numeric_limits<std::size_t>::max()), std::out_of_range);
+  CHECK_THROWS_AS(space.body(BodyId{99}), std::out_of_range);
+}
+
+TEST_CASE("Ids stay while bodies come, go and are put in order, and are never given twice") {
+  Space<double> space(quiet());
+  std::vector<BodyId> ids;
+  for (int k = 0; k < 20; ++k) {
+    ids.push_back(space.addBody(at({3.0 * ((7 * k) % 20), 0, 0})));
+  }
+  space.removeBody(ids[3]);
+  space.removeBody(ids[19]);
+  CHECK(space.n() == 18);
+  CHECK_THROWS_AS(space.body(ids[3]), std::out_of_range);
+  CHECK_THROWS_AS(space.removeBody(ids[3]), std::out_of_range);
+  space.computeDynamics(0);
+  space.reorderBodies();
+  space.computeDynamics(1);
+  for (std::size_t k = 0; k < 20; ++k) {
+    if (k != 3 && k != 19) {
+      CHECK(space.body(ids[k]).id() == ids[k]);
+      CHECK(space.body(ids[k]).position()[0] == 3.0 * static_cast<double>((7 * k) % 20));
+    }
+  }
+  // Along a line the Morton order is the order in space.
+  for (std::size_t i = 0; i + 1 < space.n(); ++i) {
+    CHECK(space.body(i).position()[0] < space.body(i + 1).position()[0]);
+  }
+  const BodyId fresh = space.addBody(at({100, 0, 0}));
+  CHECK(toInteger(fresh) > toInteger(ids[19]));
+}
+
+TEST_CASE("A body with a value out of range, or of an unknown material, is refused and not added") {
+  Space<double> space(quiet());
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  Body<double> body = at({0, 0, 0});
+  body.mass = -1.0;
+  CHECK_THROWS_WITH(space.addBody(body), ContainsSubstring("mass") && ContainsSubstring("-1"));
+  body.mass = 1.0;
+  body.radius = nan;
+  CHECK_THROWS_WITH(space.addBody(body), ContainsSubstring("radius") && ContainsSubstring("nan"));
+  body = at({0, nan, 0});
+  CHECK_THROWS_AS(space.addBody(body), std::invalid_argument);
+  body = at({0, 0, 0});
+  body.material = MaterialId{1};
+  CHECK_THROWS_WITH(space.addBody(body), ContainsSubstring("material") && ContainsSubstring("is 1"));
+  CHECK(space.n() == 0);
+  const MaterialId steel =
+      space.addMaterial({.restitution = 0.9, .staticFriction = 0.3, .kineticFriction = 0.2});
+  CHECK(steel == MaterialId{1});
+  CHECK_NOTHROW(space.addBody(body));
+  CHECK_THROWS_AS(space.addPlane({0, 0, 1}, 0.0, MaterialId{2}), std::invalid_argument);
+  // Written through a proxy: refused at the next step.
+  space.body(0).setMaterial(MaterialId{7});
+  CHECK_THROWS_WITH(space.computeDynamics(0), ContainsSubstring("material") && ContainsSubstring("7"));
+}
+
+TEST_CASE("An empty space only lets time pass") {
+  SimulationConfig<double> config = quiet();
+  config.timeStep = 0.25;
+  Space<double> space(config);
+  space.computeDynamics(0);
+  space.computeDynamics(1);
+  CHECK(space.time() == 0.5);
+  CHECK(space.steps() == 2);
+  CHECK(space.getPreviousTimeStep() == 0.25);
+  CHECK(space.profiler().entry(Phase::Gravity).calls == 0);
+  CHECK(space.profiler().entry(Phase::Integration).calls == 0);
+  CHECK(space.energyLedger().total() == 0.0);
+  CHECK(std::get<0>(space.getAllBodyTransforms()).empty());
+  space.advanceTo(10.0);
+  CHECK(space.time() == 10.0);
+}
+
+TEST_CASE("One body alone goes straight on, without gravity, search or contacts") {
+  SimulationConfig<double> config = quiet();
+  config.G = 1.0;
+  config.timeStep = 0.25;
+  Space<double> space(config);
+  Body<double> body = at({0, 0, 0});
+  body.velocity = {1, 2, 3};
+  body.angularVelocity = {0, 0, 2};
+  space.addBody(body);
+  for (std::size_t i = 0; i < 8; ++i) {
+    space.computeDynamics(i);
+  }
+  CHECK(space.body(0).position() == Vec(2, 4, 6));  // 1/4 is exact in binary
+  CHECK(space.body(0).velocity() == Vec(1, 2, 3));
+  const Quaternion<double> turned(Eigen::AngleAxisd(4.0, Vec::UnitZ()));
+  CHECK((space.body(0).orientation().coeffs() - turned.coeffs()).norm() < 1e-14);
+  CHECK(space.profiler().entry(Phase::Gravity).calls == 0);
+  CHECK(space.profiler().entry(Phase::NeighbourSearch).calls == 0);
+  CHECK(space.profiler().entry(Phase::ContactSolve).calls == 0);
+}
+
+TEST_CASE("Fixed bodies stay, whatever pulls, hits or overlaps them") {
+  SimulationConfig<double> config = quiet();
+  config.G = 1.0;
+  Space<double> space(config);
+  for (int k = 0; k < 5; ++k) {
+    Body<double> body = at({0.7 * k, 0, 0});
+    body.fixed = true;
+    body.velocity = {1, 1, 1};  // a fixed body has none
+    space.addBody(body);
+  }
+  space.setUniformField({0, 0, -9.81});
+  for (std::size_t i = 0; i < 10; ++i) {
+    space.computeDynamics(i);
+  }
+  for (std::size_t k = 0; k < 5; ++k) {
+    CHECK(space.body(k).position() == Vec(0.7 * static_cast<double>(k), 0, 0));
+    CHECK(space.body(k).velocity() == Vec::Zero());
+  }
+  CHECK(std::get<0>(space.calculateSystemEnergy()) == 0.0);
+  CHECK(space.contactCount() == 0);  // two immovable bodies make none
+}
+
+TEST_CASE("A fixed body pulls, and is hit as a wall") {
+  SimulationConfig<double> config = quiet();
+  config.G = 1.0;
+  config.timeStep = 1e-3;
+  config.coeffRestitution = 1.0;
+  config.coeffFriction = 0.0;
+  config.coeffStaticFriction = 0.0;
+  config.positionalCorrectionFactor = 0.0;
+  Space<double> space(config);
+  Body<double> planet = at({0, 0, 0}, 1.0);
+  planet.mass = 4.0;
+  planet.fixed = true;
+  space.addBody(planet);
+  Body<double> stone = at({2, 0, 0}, 0.1);
+  stone.mass = 1e-3;
+  space.addBody(stone);
+  space.computeDynamics(0);
+  CHECK_THAT(space.body(1).acceleration()[0], WithinRel(-1.0, 1e-6));  // G M / r^2, a step on
+  CHECK(space.body(0).acceleration() == Vec::Zero());
+  CHECK_THAT(space.body(0).force()[0], WithinRel(1e-3, 1e-6));  // what holds it is not in the step's forces
+  double fastest = 0;
+  bool back = false;
+  for (std::size_t i = 1; i < 3000; ++i) {
+    space.computeDynamics(i);
+    fastest = std::max(fastest, -space.body(1).velocity()[0]);
+    back = back || space.body(1).velocity()[0] > 0.9 * fastest;
+  }
+  CHECK_THAT(fastest, WithinRel(std::sqrt(2 * 4.0 * (1 / 1.1 - 1 / 2.0)), 5e-3));  // first order in the step
+  CHECK(back);
+}
+
+TEST_CASE("Energies of two bodies equal the hand formulas, softened and in a field") {
+  SimulationConfig<double> config = quiet();
+  config.G = 3.0;
+  Space<double> space(config);
+  Body<double> body = at({0, 0, 0}, 1.0);
+  body.mass = 2.0;
+  body.velocity = {0, 3, 4};
+  body.angularVelocity = {0, 0, 5};
+  space.addBody(body);
+  body = at({0, 0, 10}, 1.0);
+  body.mass = 7.0;
+  space.addBody(body);
+  const auto [translational, rotational, potential] = space.calculateSystemEnergy();
+  CHECK_THAT(translational, WithinRel(25.0, 1e-15));
+  CHECK_THAT(rotational, WithinRel(0.4 * 2 * 1 * 25 / 2, 1e-15));
+  CHECK_THAT(potential, WithinRel(-3.0 * 2 * 7 / 10, 1e-14));
+  space.setUniformField({0, 0, -2.0});
+  CHECK_THAT(std::get<2>(space.calculateSystemEnergy()), WithinRel(-4.2 + 2 * 7 * 10, 1e-14));
+  config.softening = 5.0;
+  Space<double> soft(config);
+  soft.addBody(space.body(0).load());
+  soft.addBody(space.body(1).load());
+  CHECK_THAT(std::get<2>(soft.calculateSystemEnergy()), WithinRel(-42 / std::sqrt(125.0), 1e-14));
+}
+
+TEST_CASE("Bodies that come and go take their energy with them, and the ledger says so") {
+  SimulationConfig<double> config = quiet();
+  config.G = 1.0;
+  config.timeStep = 1e-4;
+  Space<double> space(config);
+  Body<double> body = at({0, 0, 0}, 0.1);
+  body.velocity = {0.3, 0, 0};
+  space.addBody(body);
+  space.addBody(at({3, 0, 0}, 0.1));
+  CHECK(space.energyLedger().exchange == 0.0);
+  space.computeDynamics(0);
+  const double before = space.energyLedger().total();
+  body = at({0, 4, 0}, 0.2);
+  body.mass = 5.0;
+  body.velocity = {0, 1, 2};
+  body.angularVelocity = {9, 0, 0};
+  const BodyId id = space.addBody(body);
+  CHECK_THAT(space.energyLedger().total(), WithinAbs(before, 1e-13));
+  CHECK(space.energyLedger().exchange < -10.0);  // it came with 12.5 J of motion
+  space.setG(2.0);
+  CHECK_THAT(space.energyLedger().total(), WithinAbs(before, 1e-13));
+  space.setUniformField({0, 0, -1});
+  CHECK_THAT(space.energyLedger().total(), WithinAbs(before, 1e-13));
+  space.removeBody(id);
+  CHECK_THAT(space.energyLedger().total(), WithinAbs(before, 1e-13));
+}
+
+TEST_CASE("A storage with bodies in it is adopted as it is") {
+  StorageOf<double, AoS> storage;
+  storage.resize(2);
+  storage.at(fields::Position{}, 1) = Vec(4, 0, 0);
+  storage.at(fields::Mass{}, 0) = 1.0;
+  storage.at(fields::Mass{}, 1) = 2.0;
+  SimulationConfig<double> config = quiet();
+  config.bodyCount = 1;  // and random ones after them
+  Space<double, AoS> space(config, std::move(storage));
+  CHECK(space.n() == 3);
+  CHECK(space.body(1).position() == Vec(4, 0, 0));
+  CHECK(space.body(1).id() == BodyId{1});
+}

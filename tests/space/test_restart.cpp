@@ -1,0 +1,206 @@
+#include "laws/laws.hpp"
+#include "scenes/scenes.hpp"
+#include "support/catch.hpp"
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+using namespace gravel;
+using namespace gravel::test;
+
+namespace {
+
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(const std::string& name)
+      : path_((std::filesystem::temp_directory_path() /
+               ("gravel_restart_" + name + "_" + std::to_string(reinterpret_cast<std::uintptr_t>(this))))
+                  .string()) {}
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+  ~TemporaryFile() { std::filesystem::remove(path_); }
+  const std::string& path() const { return path_; }
+  std::vector<char> bytes() const {
+    std::ifstream in(path_, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  }
+  void put(const std::vector<char>& bytes) const {
+    std::ofstream out(path_, std::ios::binary | std::ios::trunc);
+    out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  }
+
+ private:
+  std::string path_;
+};
+
+/// Everything at once: gravity, field, planes, materials, friction, damping, adaptive steps, removed bodies.
+template <class S, class Layout = SoA>
+Space<S, Layout> busy() {
+  SimulationConfig<S> config;
+  config.G = S(0.5);
+  config.softening = S(0.01);
+  config.timeStep = S(4e-3);
+  config.coeffFriction = S(0.3);
+  config.coeffStaticFriction = S(0.5);
+  config.tangentialRestitution = S(0.2);
+  config.linearDamping = S(0.05);
+  config.angularDamping = S(0.1);
+  Space<S, Layout> space(config);
+  const MaterialId soft =
+      space.addMaterial({.restitution = S(0.1), .staticFriction = S(0.9), .kineticFriction = S(0.7)});
+  space.addPlane({S(0), S(0), S(1)}, S(-1.2), soft);
+  space.addPlane({S(1), S(0), S(1)}, S(-1.6));
+  space.setUniformField({S(0), S(0.1), S(-2)});
+  scenes::CloudOptions options;
+  options.count = 60;
+  options.radius = 1.0;
+  options.bodyRadius = {0.08, 0.16};
+  options.density = {10.0, 20.0};
+  options.velocityDispersion = 0.5;
+  options.bodySpin = 2.0;
+  std::size_t k = 0;
+  for (Body<S> body : scenes::rubbleCloud<S>(options)) {
+    body.material = k % 3 == 0 ? soft : defaultMaterial;
+    body.fixed = k % 20 == 7;
+    if (k % 5 == 0) {
+      body.inertia = body.mass * body.radius * body.radius * S(0.3);
+    }
+    space.addBody(body);
+    ++k;
+  }
+  space.removeBody(BodyId{11});
+  space.removeBody(BodyId{59});
+  return space;
+}
+
+}  // namespace
+
+// Run 2n, against run n, save, take up in another space, run n: the files of both ends are the same bytes,
+// and they hold every field of every body, the contacts' memory, the ledger and the time. Seen to fail: the
+// contact solver's memory left out of the file; the rest of the sum of time left out.
+TEMPLATE_TEST_CASE("n + n steps through a file are 2n steps, byte for byte", "", (std::pair<double, SoA>),
+                   (std::pair<float, AoSoA<8>>)) {
+  using S = typename TestType::first_type;
+  using Layout = typename TestType::second_type;
+  const TemporaryFile middle("middle");
+  const TemporaryFile one("one");
+  const TemporaryFile two("two");
+  auto whole = busy<S, Layout>();
+  std::size_t touched = 0;
+  for (std::size_t i = 0; i < 400; ++i) {
+    whole.computeDynamics(i);
+    touched += whole.contactCount();
+    if (i == 199) {
+      whole.save(middle.path());
+    }
+  }
+  CHECK(touched > 5000);  // there is a contact memory to be lost
+  whole.save(one.path());
+
+  Space<S, Layout> again;
+  again.addBody(Body<S>());  // gives way
+  again.restore(middle.path());
+  CHECK(again.steps() == 200);
+  CHECK(again.n() == 58);
+  for (std::size_t i = 200; i < 400; ++i) {
+    again.computeDynamics(i);
+  }
+  again.save(two.path());
+  CHECK(sameBits(stateOf(whole), stateOf(again)));
+  CHECK(one.bytes() == two.bytes());
+  CHECK(again.addBody(Body<S>()) == BodyId{60});  // ids of removed bodies are not given again
+}
+
+TEST_CASE("A file taken up in another layout continues with the same bits") {
+  const TemporaryFile file("layout");
+  auto soa = busy<double>();
+  advance(soa, 50);
+  soa.save(file.path());
+  Space<double, AoS> aos;
+  aos.restore(file.path());
+  advance(soa, 50);
+  advance(aos, 50);
+  CHECK(sameBits(stateOf(soa), stateOf(aos)));
+}
+
+TEST_CASE("Settings, planes, materials and the domain come back") {
+  const TemporaryFile file("settings");
+  auto space = busy<double>();
+  space.setCoeffRestitution(0.875);
+  space.setDiagnosticsEnabled(true);
+  space.save(file.path());
+  Space<double> back;
+  back.restore(file.path());
+  CHECK(back.getCoeffRestitution() == 0.875);
+  CHECK(back.isDiagnosticsEnabled());
+  CHECK(back.getG() == 0.5);
+  CHECK(back.uniformField() == Vec(0, 0.1, -2));
+  CHECK(back.addPlane({0, 0, 1}, -100.0) == 2);
+  CHECK(back.addMaterial({}) == MaterialId{2});
+  CHECK(back.body(BodyId{7}).isFixed());
+
+  Space<double> box(plain(1e-3));
+  box.setDomain(Domain<double>::periodic({3, 4, 5}));
+  box.save(file.path());
+  Space<double> other;
+  other.restore(file.path());
+  CHECK(other.domain() == Domain<double>::periodic({3, 4, 5}));
+}
+
+TEST_CASE("Damaged, cut, foreign and missing files are refused, and the space stays as it was") {
+  const TemporaryFile file("bad");
+  auto saved = busy<double>();
+  advance(saved, 5);
+  saved.save(file.path());
+  const std::vector<char> good = file.bytes();
+
+  auto space = busy<double>();
+  advance(space, 3);
+  const auto before = stateOf(space);
+  const double energy = space.energyLedger().total();
+  const auto refuses = [&](const char* why) {
+    CHECK_THROWS_WITH(space.restore(file.path()), ContainsSubstring(why));
+    CHECK(sameBits(stateOf(space), before));
+    CHECK(space.energyLedger().total() == energy);
+    CHECK(space.getCoeffFriction() == 0.3);
+  };
+  for (const std::size_t at : {std::size_t{3}, std::size_t{100}, good.size() / 2, good.size() - 1}) {
+    std::vector<char> bytes = good;
+    bytes[at] = static_cast<char>(bytes[at] ^ 1);
+    file.put(bytes);
+    refuses(at == 3 ? "not a snapshot" : "damaged");
+    bytes = good;
+    bytes.resize(at);
+    file.put(bytes);
+    refuses(at == 3 ? "not a snapshot" : "damaged");
+  }
+  file.put({});
+  refuses("not a snapshot");
+  Space<float> narrow;
+  narrow.save(file.path());
+  refuses("another Scalar");
+  CHECK_THROWS_AS(space.restore("/nowhere/at/all"), std::runtime_error);
+  // A value out of range in a file whose checksum is right.
+  SnapshotWriter out;
+  out.write(file.path());
+  refuses("setting bodyCount");
+  // And it goes on as if nothing had been.
+  auto twin = busy<double>();
+  advance(twin, 3);
+  advance(space, 20);
+  advance(twin, 20);
+  CHECK(sameBits(stateOf(space), stateOf(twin)));
+}
+
+TEST_CASE("The hook and the log stay those of the space that takes a file up") {
+  const TemporaryFile file("hook");
+  Space<double> space(plain(1e-3));
+  space.addBody(ball({0, 0, 0}, {0, 0, 0}, 0.5));
+  space.save(file.path());
+  int calls = 0;
+  space.setForceHook([&calls](Bodies<double, SoA>&, double) { ++calls; });
+  space.restore(file.path());
+  space.computeDynamics(0);
+  CHECK(calls > 0);
+}

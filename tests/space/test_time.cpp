@@ -1,0 +1,198 @@
+#include "support/catch.hpp"
+#include <gravel/space/space.hpp>
+
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+#include <string>
+
+using namespace gravel;
+using namespace gravel::test;
+
+namespace {
+
+using Vec = Vector3<double>;
+
+SimulationConfig<double> quiet(double dt) {
+  SimulationConfig<double> config;
+  config.G = 0.0;
+  config.timeStep = dt;
+  config.adaptiveTimeStep = false;
+  return config;
+}
+
+Body<double> at(const Vec& x, const Vec& v, double radius = 0.5) {
+  Body<double> body;
+  body.position = x;
+  body.velocity = v;
+  body.radius = radius;
+  return body;
+}
+
+/// What a call writes to standard output.
+template <class F>
+std::string captured(F&& f) {
+  std::fflush(stdout);
+  std::FILE* file = std::tmpfile();
+  REQUIRE(file != nullptr);
+  const int old = dup(fileno(stdout));
+  dup2(fileno(file), fileno(stdout));
+  f();
+  std::fflush(stdout);
+  dup2(old, fileno(stdout));
+  close(old);
+  std::rewind(file);
+  std::string text;
+  char block[4096];
+  for (std::size_t n = 0; (n = std::fread(block, 1, sizeof block, file)) > 0;) {
+    text.append(block, n);
+  }
+  std::fclose(file);
+  return text;
+}
+
+}  // namespace
+
+TEST_CASE("advanceTo ends at the time asked for exactly, and leaves the step as it was") {
+  Space<double> space(quiet(0.1));
+  space.addBody(at({0, 0, 0}, {1, 0, 0}));
+  space.advanceTo(1.0);
+  CHECK(space.time() == 1.0);
+  CHECK(space.steps() == 10);  // 0.1 ten times is 1 but for rounding, which makes no step of its own
+  CHECK_THAT(space.body(0).position()[0], WithinAbs(1.0, 1e-15));
+  space.advanceTo(1.25);
+  CHECK(space.time() == 1.25);
+  CHECK(space.steps() == 13);
+  CHECK(space.getTimeStep() == 0.1);
+  CHECK_THAT(space.getPreviousTimeStep(), WithinAbs(0.05, 1e-15));
+  space.advanceTo(1.25);  // there already
+  CHECK(space.steps() == 13);
+  CHECK_THROWS_WITH(space.advanceTo(1.0), ContainsSubstring("1.25"));
+  CHECK_THROWS_AS(space.advanceTo(std::numeric_limits<double>::quiet_NaN()), std::invalid_argument);
+  CHECK_THROWS_AS(space.advanceTo(std::numeric_limits<double>::infinity()), std::invalid_argument);
+  CHECK(space.time() == 1.25);
+}
+
+TEST_CASE("A million steps of a tenth of a millisecond are a hundred seconds, to an ulp") {
+  Space<double> space(quiet(1e-4));
+  for (std::size_t i = 0; i < 1000000; ++i) {
+    space.computeDynamics(i);
+  }
+  // Plain addition is off by 1e-8 there.
+  CHECK_THAT(space.time(), WithinAbs(100.0, 2e-14));
+}
+
+TEST_CASE("Adaptive steps shorten for a fast approach, keep to their limits, and are the steps taken") {
+  SimulationConfig<double> config = quiet(0.1);
+  config.adaptiveTimeStep = true;
+  config.minTimeStep = 1e-4;
+  Space<double> space(config);
+  space.addBody(at({0, 0, 0}, {0, 0, 0}));
+  space.addBody(at({1.5, 0, 0}, {-50, 0, 0}));
+  CHECK(space.getTimeStep() == 0.1);
+  space.setTimeStep(1e-3);
+  CHECK(space.getTimeStep() == 1e-3);
+  space.computeDynamics(0);
+  CHECK(space.getPreviousTimeStep() == 1e-3);
+  CHECK(space.getTimeStep() <= 1e-3);
+  CHECK(space.getTimeStep() >= 1e-4);
+  Space<double> slow(config);
+  slow.addBody(at({0, 0, 0}, {0, 0, 0}));
+  slow.addBody(at({1.01, 0, 0}, {-2, 0, 0}));
+  slow.computeDynamics(0);
+  CHECK(slow.getPreviousTimeStep() < 0.1);  // it would meet within the step: the pair has been found
+  CHECK(slow.getPreviousTimeStep() > 1e-3);
+}
+
+TEST_CASE("Diagnostics log energies every logFrequency steps, to where the user says") {
+  SimulationConfig<double> config = quiet(0.5);
+  config.diagnosticsEnabled = true;
+  config.logFrequency = 5;
+  Space<double> space(config);
+  space.addBody(at({0, 0, 0}, {2, 0, 0}));
+  std::vector<std::string> lines;
+  space.setLog([&](const char* line) { lines.emplace_back(line); });
+  for (std::size_t i = 0; i < 11; ++i) {
+    space.computeDynamics(i);
+  }
+  REQUIRE(lines.size() == 3);  // 0, 5, 10
+  CHECK_THAT(lines[1], ContainsSubstring("step 5") && ContainsSubstring("t 3 s") &&
+                           ContainsSubstring("kinetic 2 J") && ContainsSubstring("potential"));
+  space.setDiagnosticsEnabled(false);
+  space.computeDynamics(15);
+  CHECK(lines.size() == 3);
+}
+
+TEST_CASE("Without a log of the user's own the lines go to standard output") {
+  SimulationConfig<double> config = quiet(0.5);
+  config.diagnosticsEnabled = true;
+  Space<double> space(config);
+  space.addBody(at({0, 0, 0}, {2, 0, 0}));
+  CHECK_THAT(captured([&] { space.computeDynamics(0); }), ContainsSubstring("kinetic 2 J"));
+}
+
+// An orbit run with a step of a third of a period is no orbit: its energy jumps at the first steps.
+TEST_CASE("The log warns when the ledger moves, and not when it does not") {
+  for (const double dt : {2.0, 0.01}) {
+    SimulationConfig<double> config = quiet(dt);
+    config.G = 1.0;
+    config.diagnosticsEnabled = true;
+    config.logFrequency = 1;
+    Space<double> space(config);
+    Body<double> body = at({0, 0, 0}, {0, 0, 0}, 0.0);
+    space.addBody(body);
+    body = at({1.5, 0, 0}, {0, std::sqrt(1.0 / 3), 0}, 0.0);
+    body.mass = 1e-3;
+    space.addBody(body);
+    std::string log;
+    space.setLog([&](const char* line) { log += std::string(line) + "\n"; });
+    for (std::size_t i = 0; i < 50; ++i) {
+      space.computeDynamics(i);
+    }
+    CAPTURE(dt, log);
+    CHECK((log.find("warning") != std::string::npos) == (dt > 1.0));
+    if (dt > 1.0) {
+      CHECK_THAT(log, ContainsSubstring("unstable") && ContainsSubstring("shorter step"));
+    }
+  }
+}
+
+TEST_CASE("The profiling report names every phase, and why one was skipped") {
+  Space<double> space(quiet(1e-3));
+  space.addBody(at({0, 0, 0}, {0, 0, 0}));
+  space.computeDynamics(0);
+  const std::string report = captured([&] { space.printProfilingReport(); });
+  for (std::size_t p = 0; p < phaseCount; ++p) {
+    CHECK_THAT(report, ContainsSubstring(phaseName(static_cast<Phase>(p))));
+  }
+  CHECK_THAT(report, ContainsSubstring("G is 0") && ContainsSubstring("seconds") &&
+                         ContainsSubstring("both rates are 0") && ContainsSubstring("total"));
+}
+
+TEST_CASE("Changing the place, mass or velocity of a body between steps counts from the next step") {
+  SimulationConfig<double> config = quiet(1e-3);
+  config.G = 1.0;
+  Space<double> moved(config);
+  Space<double> fresh(config);
+  for (Space<double>* space : {&moved, &fresh}) {
+    space->addBody(at({0, 0, 0}, {0, 0, 0}, 0.1));
+  }
+  moved.addBody(at({1, 0, 0}, {0, 0, 0}, 0.1));
+  moved.computeDynamics(0);
+  moved.body(0).position() = Vec(0, 0, 0);
+  moved.body(0).velocity() = Vec(0, 0, 0);
+  moved.body(1).position() = Vec(0, 5, 0);
+  moved.body(1).velocity() = Vec(0, 0, 1);
+  moved.body(1).mass() = 3.0;
+  Body<double> body = at({0, 5, 0}, {0, 0, 1}, 0.1);
+  body.mass = 3.0;
+  fresh.addBody(body);
+  moved.computeDynamics(1);
+  fresh.computeDynamics(0);
+  for (std::size_t i = 0; i < 2; ++i) {  // no force of the old place is left in the step
+    CHECK(moved.body(i).position() == fresh.body(i).position());
+    CHECK(moved.body(i).velocity() == fresh.body(i).velocity());
+  }
+}
