@@ -6,7 +6,7 @@
 set -eu
 
 library="g++ cmake ninja-build pkg-config libeigen3-dev libnanoflann-dev"
-run="libcli11-dev libtomlplusplus-dev libstb-dev"
+run="libcli11-dev libtomlplusplus-dev libstb-dev libtachyon-mt-0-dev"
 tests="catch2 binutils"
 benchmarks="libbenchmark-dev"
 gates="clang clang-format clang-tidy libomp-dev libclang-rt-dev"

@@ -87,12 +87,17 @@ class Renderer {
     rt_camera_position(scene(), vectorOf(back_), vectorOf(-back_), vectorOf(up_));
     const double halfWidth = halfHeight_ * view_.width / view_.height;
     rt_camera_frustum(scene(), halfWidth, -halfWidth, -halfHeight_, halfHeight_);  // else left is right
-    rt_camera_raydepth(scene(), 30);  // surfaces of trails, one behind another
+    rt_camera_raydepth(scene(), 4);
+  }
+
+  Colour skyBelow() const {
+    return view_.stars ? Colour(0.003F, 0.0035F, 0.006F) : Colour(0.46F, 0.50F, 0.56F);
   }
 
   void setLight() {
     rt_shadermode(scene(), RT_SHADER_FULL);
-    rt_shadow_filtering(scene(), 0);  // what is not opaque, the trails, has no shadow
+    rt_shadow_filtering(scene(), 0);  // trails, not quite opaque, have no shadow
+    rt_trans_mode(scene(), RT_TRANS_VMD);
     rt_phong_shader(scene(), RT_SHADER_PHONG);
     const Vector3<double> toSun = view_.stars ? Vector3<double>(-0.75 * right_ + 0.45 * up_ + 0.55 * back_)
                                               : Vector3<double>(sceneUp_ - 0.35 * right_ + 0.35 * back_);
@@ -101,7 +106,7 @@ class Renderer {
     const Colour skylight = view_.stars ? Colour(0.10F, 0.11F, 0.14F) : Colour(0.42F, 0.46F, 0.52F);
     rt_ambient_occlusion(scene(), view_.stars ? 4 : 8, colourOf(skylight));
 
-    const Colour low = view_.stars ? Colour(0.003F, 0.0035F, 0.006F) : Colour(0.46F, 0.50F, 0.56F);
+    const Colour low = skyBelow();
     const Colour high = view_.stars ? low : Colour(0.72F, 0.79F, 0.87F);
     rt_background(scene(), colourOf(low));
     rt_background_gradient(scene(), vectorOf(sceneUp_), 1.0, -1.0, colourOf(high), colourOf(low));
@@ -211,15 +216,17 @@ class Renderer {
       for (; begin < end; ++begin) {
         const Vector3<double> x = local(trail.points[begin]);
         pixel = pixelAt(x);
-        if (begin == 0 || (x - last).norm() > pixel) {
+        if (begin == 0 || (x - last).norm() > 4.0 * pixel) {
           corners.push_back(vectorOf(x));
           last = x;
         }
       }
       if (corners.size() > 1 && pixel > 0.0) {
-        const double age = static_cast<double>(piece + 1) / static_cast<double>(pieces);  // 1: now
-        rt_polycylinder(scene(), texture(trail.colour, 1.0, 0.0, 0.1 + 0.6 * age * age), corners.data(),
-                        static_cast<int>(corners.size()), 0.8 * pixel);
+        const float age = static_cast<float>(piece + 1) / static_cast<float>(pieces);  // 1: now
+        const float strength = 0.15F + 0.85F * age * age;
+        const Colour colour = trail.colour * strength + skyBelow() * (1.0F - strength);
+        rt_polycylinder(scene(), texture(colour, 1.0, 0.0, 0.97), corners.data(),
+                        static_cast<int>(corners.size()), 0.7 * pixel);
       }
     }
   }
