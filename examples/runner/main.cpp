@@ -193,8 +193,7 @@ int run(const Options& options) {
   if (series) {
     tell("Frames:", series->index().string() + "  (" + std::to_string(series->frames()) + ", for ParaView)");
   }
-  if (!options.noPicture) {
-    writePicture(folder / "picture.png", scene, space, trails);
+  if (!options.noPicture && writePicture(folder / "picture.png", scene, space, trails)) {
     tell("Picture:", folder / "picture.png");
   }
   return facts.interrupted ? 130 : 0;
