@@ -74,7 +74,7 @@ void checkConstant(const char* what, Real80 got, Real80 expected) {
 }  // namespace
 
 // Published asymptotic constants of kick-drift-kick leapfrog, both sides: a smaller error would mean that the
-// test does not test it. Seen to fail: the force taken at the step's beginning (symplectic Euler).
+// test does not test it. Seen to fail: one kick of the whole step (symplectic Euler).
 TEST_CASE("Velocity Verlet makes the published errors on Kepler orbits, to 5 %") {
   for (const Real80 share : {0.0L, 0.3L}) {  // about a centre that rests, and two bodies that both move
     for (const int n : {1000, 10000}) {

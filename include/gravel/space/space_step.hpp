@@ -107,7 +107,7 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration) {
 }
 
 /// Checks all bodies; then forces, contacts and the step of the present places, if a body, its place or its
-/// mass was changed since they were found.
+/// mass was changed, or it became fixed or free, since they were found.
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::prepare() {
   bodies_.validateAll();
@@ -121,12 +121,23 @@ void Space<Scalar, Layout>::prepare() {
   }
 }
 
+namespace detail {
+
+/// The mass of a movable body; another number if it is fixed.
+template <class Proxy, class Scalar = typename Proxy::Scalar>
+Scalar massAndState(const Proxy& body) {
+  const Scalar m = body.mass();
+  return body.isFixed() ? Scalar(-m - Scalar(1)) : m;
+}
+
+}  // namespace detail
+
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::rememberPlaces() {
   places_.resize(n());
   parallelFor(n(), detail::bodyGrain, [&](std::size_t i) {
     places_[i].template head<3>() = bodies_[i].position().array();
-    places_[i][3] = bodies_[i].mass();
+    places_[i][3] = detail::massAndState(bodies_[i]);
   });
   forcesValid_ = true;
 }
@@ -140,8 +151,8 @@ bool Space<Scalar, Layout>::placesChanged() const {
     std::size_t count = 0;
     for (std::size_t i = begin; i < end; ++i) {
       const auto body = bodies_[i];
-      const bool same =
-          (places_[i].template head<3>() == body.position().array()).all() && places_[i][3] == body.mass();
+      const bool same = (places_[i].template head<3>() == body.position().array()).all() &&
+                        places_[i][3] == detail::massAndState(body);
       count += same ? 0 : 1;
     }
     return count;
