@@ -58,7 +58,7 @@ Space<double, Layout> spaceOf(const std::vector<Body<double>>& bodies,
 #endif
 
 // Enough bodies and contacts for many chunks of every loop that is shared.
-// Seen to fail: a sum by `reduction(+)`, whose order is the threads'.
+// Seen to fail: orderedSum with as many chunks as there are threads.
 TEST_CASE("Gravity, contacts and friction are the same bits for 1, 2, 3 and 8 threads") {
   const int threads = omp_get_max_threads();
   const std::vector<Body<double>> bodies = grains(2000);
@@ -92,7 +92,7 @@ TEST_CASE("Gravity, contacts and friction are the same bits for 1, 2, 3 and 8 th
     CHECK(sameBits(one, state));
   }
   omp_set_num_threads(threads);
-  CHECK(contacts > 100 * steps);
+  CHECK(contacts > 40 * steps);  // 900 in the first 20, while they gather
 }
 #endif
 

@@ -57,7 +57,7 @@ TEST_CASE("Planes are counted, keep bodies on their free side, and refuse what i
   CHECK(std::abs(space.body(0).velocity()[2]) == 3.0);
 }
 
-TEST_CASE("A pair of materials has the geometric mean of its coefficients; the space's own is one of them") {
+TEST_CASE("A pair of materials has the geometric mean of its coefficients, with the space's own among them") {
   SimulationConfig<double> config = quiet(1e-3);
   config.coeffRestitution = 0.25;
   Space<double> space(config);
