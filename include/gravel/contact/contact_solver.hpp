@@ -53,7 +53,7 @@ class ContactSolver {
   template <ContactBodies B>
   void begin(std::span<const Contact<S>> contacts, const B& bodies) {
     contacts_ = contacts;
-    impulses_.assign(contacts.size(), ContactImpulse<S>{});
+    impulses_.clear();
     coloring_.build(contacts, bodies);
   }
 
@@ -63,6 +63,7 @@ class ContactSolver {
   template <ContactBodies B>
   ContactReport<S> solve(B& bodies, const S& dt) {
     const std::span<const Contact<S>> contacts = contacts_;
+    impulses_.assign(contacts.size(), ContactImpulse<S>{});
     ContactReport<S> report;
     if (!contacts.empty()) {
       problem_.gather(contacts, bodies, coloring_, dt, settings_);
