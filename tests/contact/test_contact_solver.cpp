@@ -3,6 +3,7 @@
 #include "scenes.hpp"
 #include "support/archetypes.hpp"
 #include "support/catch.hpp"
+#include "support/threads.hpp"
 
 #include <omp.h>
 
@@ -12,17 +13,6 @@ using namespace gravel;
 using namespace gravel::test;
 
 namespace {
-
-class Threads {
- public:
-  explicit Threads(int n) : before_(omp_get_max_threads()) { omp_set_num_threads(n); }
-  ~Threads() { omp_set_num_threads(before_); }
-  Threads(const Threads&) = delete;
-  Threads& operator=(const Threads&) = delete;
-
- private:
-  int before_;
-};
 
 /// Contacts that a random material was drawn for, each its own.
 template <class S, class B>
@@ -224,7 +214,7 @@ TEST_CASE("same bits for 1, 2, 3 and 8 threads, and whatever the indices of the 
   };
   Bodies<double, SoA> one = start;
   {
-    const Threads threads(1);
+    const WithThreads threads(1);
     run(one, pairs);
   }
   const auto same = [&](const Bodies<double, SoA>& other) {
@@ -239,7 +229,7 @@ TEST_CASE("same bits for 1, 2, 3 and 8 threads, and whatever the indices of the 
     return true;
   };
   for (const int count : {2, 3, 8}) {
-    const Threads threads(count);
+    const WithThreads threads(count);
     Bodies<double, SoA> many = start;
     run(many, pairs);
     CHECK(same(many));

@@ -1,4 +1,5 @@
 #include "support/catch.hpp"
+#include "support/threads.hpp"
 #include <gravel/core/parallel.hpp>
 #include <gravel/core/types.hpp>
 
@@ -11,20 +12,9 @@
 #include <thread>
 
 using namespace gravel;
+using namespace gravel::test;
 
 namespace {
-
-/// The number of threads for one scope.
-class Threads {
- public:
-  explicit Threads(int n) : before_(omp_get_max_threads()) { omp_set_num_threads(n); }
-  ~Threads() { omp_set_num_threads(before_); }
-  Threads(const Threads&) = delete;
-  Threads& operator=(const Threads&) = delete;
-
- private:
-  int before_;
-};
 
 constexpr std::size_t largest = std::numeric_limits<std::size_t>::max();
 
@@ -53,7 +43,7 @@ void waitMilliseconds(int ms) { std::this_thread::sleep_for(std::chrono::millise
 
 TEST_CASE("parallel: chunks cover every index once, in pieces of the length asked for", "[parallel]") {
   for (const int threads : {1, 2, 3, 8}) {
-    const Threads scope(threads);
+    const WithThreads scope(threads);
     for (const std::size_t n : {0U, 1U, 2U, 7U, 64U, 1000U}) {
       for (const std::size_t chunk : {std::size_t{0}, std::size_t{1}, std::size_t{7}, std::size_t{64}, n,
                                       n + 1, largest - 1, largest}) {
@@ -78,7 +68,7 @@ TEST_CASE("parallel: chunks cover every index once, in pieces of the length aske
 
 TEST_CASE("parallel: parallelFor calls each index once", "[parallel]") {
   for (const int threads : {1, 2, 3, 8}) {
-    const Threads scope(threads);
+    const WithThreads scope(threads);
     std::vector<int> seen(1003, 0);
     parallelFor(seen.size(), 10, [&](std::size_t i) { ++seen[i]; });
     CHECK(std::all_of(seen.begin(), seen.end(), [](int times) { return times == 1; }));
@@ -91,11 +81,11 @@ TEST_CASE("parallel: ordered sums have the same bits for any number of threads",
     for (const std::size_t chunk : {1U, 3U, 64U, 1000U}) {
       double expected = 0.0;
       {
-        const Threads scope(1);
+        const WithThreads scope(1);
         expected = orderedSum(n, chunk, 0.0, harmonic);
       }
       for (const int threads : {2, 3, 8}) {
-        const Threads scope(threads);
+        const WithThreads scope(threads);
         for (int repeat = 0; repeat < 3; ++repeat) {
           INFO("threads " << threads << ", n " << n << ", chunk " << chunk);
           CHECK(orderedSum(n, chunk, 0.0, harmonic) == expected);
@@ -143,7 +133,7 @@ TEST_CASE("parallel: ordered sums of vectors, of one chunk and of none", "[paral
 }
 
 TEST_CASE("parallel: with two threads two chunks run at the same time", "[parallel]") {
-  const Threads scope(2);
+  const WithThreads scope(2);
   std::atomic<int> started{0};
   std::atomic<int> met{0};
   parallelForTasks(2, [&](std::size_t) {
@@ -157,7 +147,7 @@ TEST_CASE("parallel: with two threads two chunks run at the same time", "[parall
 }
 
 TEST_CASE("parallel: one chunk runs on the calling thread and opens no region", "[parallel]") {
-  const Threads scope(8);
+  const WithThreads scope(8);
   const auto caller = std::this_thread::get_id();
   int calls = 0;
   parallelForChunks(5, 5, [&](std::size_t begin, std::size_t end) {
@@ -173,7 +163,7 @@ TEST_CASE("parallel: one chunk runs on the calling thread and opens no region", 
 // Keeping the exception that comes first in time fails here: chunk 3 waits before it throws.
 TEST_CASE("parallel: the exception of the lowest chunk comes out, for any number of threads", "[parallel]") {
   for (const int threads : {1, 2, 3, 8}) {
-    const Threads scope(threads);
+    const WithThreads scope(threads);
     for (int repeat = 0; repeat < 20; ++repeat) {
       std::atomic<int> before{0};
       const auto task = [&](std::size_t c) {
@@ -203,7 +193,7 @@ TEST_CASE("parallel: the exception of the lowest chunk comes out, for any number
 
 TEST_CASE("parallel: exceptions of any type come out of the region", "[parallel]") {
   for (const int threads : {1, 2, 8}) {
-    const Threads scope(threads);
+    const WithThreads scope(threads);
     int caught = 0;
     try {
       parallelForTasks(4, [](std::size_t c) {
@@ -221,7 +211,7 @@ TEST_CASE("parallel: exceptions of any type come out of the region", "[parallel]
 
 TEST_CASE("parallel: nested calls run on one thread and give the same results", "[parallel]") {
   for (const int threads : {1, 2, 3, 8}) {
-    const Threads scope(threads);
+    const WithThreads scope(threads);
     CHECK(threadCount() == threads);
     std::vector<double> sums(6, 0.0);
     std::atomic<bool> oneInside{true};

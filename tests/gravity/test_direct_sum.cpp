@@ -1,7 +1,7 @@
 #include "oracle/gravity.hpp"
-#include "oracle/threads.hpp"
 #include "support/archetypes.hpp"
 #include "support/catch.hpp"
+#include "support/threads.hpp"
 #include <gravel/bodies/bodies.hpp>
 #include <gravel/gravity/direct_sum.hpp>
 

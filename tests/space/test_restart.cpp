@@ -1,38 +1,12 @@
 #include "laws/laws.hpp"
 #include "scenes/scenes.hpp"
 #include "support/catch.hpp"
-
-#include <filesystem>
-#include <fstream>
-#include <iterator>
+#include "support/temporary_file.hpp"
 
 using namespace gravel;
 using namespace gravel::test;
 
 namespace {
-
-class TemporaryFile {
- public:
-  explicit TemporaryFile(const std::string& name)
-      : path_((std::filesystem::temp_directory_path() /
-               ("gravel_restart_" + name + "_" + std::to_string(reinterpret_cast<std::uintptr_t>(this))))
-                  .string()) {}
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-  ~TemporaryFile() { std::filesystem::remove(path_); }
-  const std::string& path() const { return path_; }
-  std::vector<char> bytes() const {
-    std::ifstream in(path_, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  }
-  void put(const std::vector<char>& bytes) const {
-    std::ofstream out(path_, std::ios::binary | std::ios::trunc);
-    out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  }
-
- private:
-  std::string path_;
-};
 
 /// Everything at once: gravity, field, planes, materials, friction, damping, adaptive steps, removed bodies.
 template <class S, class Layout = SoA>

@@ -1,3 +1,4 @@
+#include "space/quiet_spaces.hpp"
 #include "support/catch.hpp"
 #include <gravel/space/space.hpp>
 
@@ -12,24 +13,6 @@ using namespace gravel;
 using namespace gravel::test;
 
 namespace {
-
-using Vec = Vector3<double>;
-
-SimulationConfig<double> quiet(double dt) {
-  SimulationConfig<double> config;
-  config.G = 0.0;
-  config.timeStep = dt;
-  config.adaptiveTimeStep = false;
-  return config;
-}
-
-Body<double> at(const Vec& x, const Vec& v, double radius = 0.5) {
-  Body<double> body;
-  body.position = x;
-  body.velocity = v;
-  body.radius = radius;
-  return body;
-}
 
 /// What a call writes to standard output.
 template <class F>
