@@ -13,12 +13,11 @@
 // number of threads. Compare rows of one run only, on an idle machine.
 
 #include "contact/scenes.hpp"
+#include "stopwatch.hpp"
 #include <gravel/spatial/broad_phase.hpp>
 
 #include <benchmark/benchmark.h>
 #include <omp.h>
-
-#include <ctime>
 
 namespace {
 
@@ -100,15 +99,6 @@ const Scene& packing() {
   }();
   return scene;
 }
-
-/// Processor time of all threads, so that the figures are those of a core.
-class Stopwatch {
- public:
-  double nanoseconds() const { return 1e9 * static_cast<double>(std::clock() - start_) / CLOCKS_PER_SEC; }
-
- private:
-  std::clock_t start_ = std::clock();
-};
 
 void narrowPhase(benchmark::State& state) {
   const Scene& scene = packing();

@@ -7,6 +7,7 @@
 // Compare rows of one run only, and medians (--benchmark_repetitions=5
 // --benchmark_enable_random_interleaving=true).
 
+#include "stopwatch.hpp"
 #include <gravel/bodies/bodies.hpp>
 #include <gravel/core/random.hpp>
 #include <gravel/gravity/direct_sum.hpp>
@@ -14,24 +15,14 @@
 #include <benchmark/benchmark.h>
 
 #include <cmath>
-#include <ctime>
 
 namespace {
 
 using namespace gravel;
 
-/// Processor time of all threads, so that the figure is one of a core.
-class Watch {
- public:
-  double seconds() const { return static_cast<double>(std::clock() - start_) / CLOCKS_PER_SEC; }
-
- private:
-  std::clock_t start_ = std::clock();
-};
-
-void reportTime(benchmark::State& state, std::size_t n, const Watch& watch) {
+void reportTime(benchmark::State& state, std::size_t n, const Stopwatch& watch) {
   const double pairs = static_cast<double>(n) * static_cast<double>(n);
-  state.counters["ns_per_pair"] = 1e9 * watch.seconds() / (static_cast<double>(state.iterations()) * pairs);
+  state.counters["ns_per_pair"] = watch.nanoseconds() / (static_cast<double>(state.iterations()) * pairs);
 }
 
 template <class S, class Layout>
@@ -74,7 +65,7 @@ void directSum(benchmark::State& state) {
   const auto n = static_cast<std::size_t>(state.range(0));
   auto bodies = cloud<S, Layout>(n);
   DirectSum<S> sum;
-  const Watch watch;
+  const Stopwatch watch;
   for (auto _ : state) {
     sum.accelerations(bodies.positions(), bodies.masses(), S(1), S(0), bodies.accelerations());
     benchmark::ClobberMemory();
@@ -88,7 +79,7 @@ void potentialEnergy(benchmark::State& state) {
   const auto n = static_cast<std::size_t>(state.range(0));
   const auto bodies = cloud<S, SoA>(n);
   DirectSum<S> sum;
-  const Watch watch;
+  const Stopwatch watch;
   for (auto _ : state) {
     benchmark::DoNotOptimize(sum.potentialEnergy(bodies.positions(), bodies.masses(), S(1), S(0)));
   }
@@ -107,7 +98,7 @@ void plainLoop(benchmark::State& state) {
     z[i] = bodies[i].position()[2];
     m[i] = bodies[i].mass();
   }
-  const Watch watch;
+  const Stopwatch watch;
   for (auto _ : state) {
     for (std::size_t i = 0; i < n; ++i) {
       S sx(0), sy(0), sz(0);
