@@ -57,6 +57,9 @@ class ContactSolver {
     coloring_.build(contacts, bodies);
   }
 
+  /// The contacts of begin(), at the place where they stand now: after they, or what owns them, were copied.
+  void rebind(std::span<const Contact<S>> contacts) { contacts_ = contacts; }
+
   /// Changes the velocities (and, where there is friction, the spins) of the bodies so that every contact
   /// of begin() obeys restitution and Coulomb's law.
   /// \param dt [s] >= 0, the step for which the contacts stand

@@ -148,6 +148,7 @@ class ContactStage {
     settings.tolerance = config.contactTolerance;
     settings.maxIterations = static_cast<int>(config.contactIterations);
     solver_.setSettings(settings);
+    solver_.rebind(contacts_);  // the space may be a copy
     const ContactReport<Scalar> half = solver_.solve(bodies, h);
     acted_ = half.iterations > 0;
     if (!acted_) {
