@@ -49,10 +49,10 @@ Space<double, Layout> spaceOf(const std::vector<Body<double>>& bodies,
 
 #ifdef _OPENMP
 
-#if defined(__SANITIZE_THREAD__)
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
 #define GRAVEL_TEST_SLOW
 #elif defined(__has_feature)
-#if __has_feature(thread_sanitizer)
+#if __has_feature(thread_sanitizer) || __has_feature(address_sanitizer)
 #define GRAVEL_TEST_SLOW
 #endif
 #endif
