@@ -188,9 +188,16 @@ void readMaterial(TableReader& reader, const SimulationConfig<double>& config, S
   material.kineticFriction = config.coeffFriction;
   material.staticFriction = std::max(config.coeffStaticFriction, config.coeffFriction);
   material.tangentialRestitution = config.tangentialRestitution;
+  material.restitutionExponent = config.restitutionExponent;
+  material.restitutionSpeed = config.restitutionSpeed;
+  material.rollingFriction = config.rollingFriction;
+  material.spinningFriction = config.spinningFriction;
   const Range unit = detail::unitInterval<double>();
-  const bool own = reader.has("restitution") || reader.has("friction") || reader.has("staticFriction") ||
-                   reader.has("tangentialRestitution");
+  bool own = false;
+  for (const char* key : {"restitution", "friction", "staticFriction", "tangentialRestitution",
+                          "restitutionExponent", "restitutionSpeed", "rollingFriction", "spinningFriction"}) {
+    own = own || reader.has(key);
+  }
   reader.real("restitution", material.restitution, unit);
   reader.real("friction", material.kineticFriction, notNegative());
   material.staticFriction = std::max(material.staticFriction, material.kineticFriction);
@@ -202,6 +209,10 @@ void readMaterial(TableReader& reader, const SimulationConfig<double>& config, S
                                             detail::formatReal(material.kineticFriction));
   }
   reader.real("tangentialRestitution", material.tangentialRestitution, unit);
+  reader.real("restitutionExponent", material.restitutionExponent, unit);
+  reader.real("restitutionSpeed", material.restitutionSpeed, positive());
+  reader.real("rollingFriction", material.rollingFriction, notNegative());
+  reader.real("spinningFriction", material.spinningFriction, notNegative());
   if (own) {
     plane.material = material;
   }

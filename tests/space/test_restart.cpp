@@ -20,6 +20,8 @@ Space<S, Layout> busy() {
   config.coeffFriction = S(0.3);
   config.coeffStaticFriction = S(0.5);
   config.tangentialRestitution = S(0.2);
+  config.restitutionExponent = S(0.2);
+  config.restitutionSpeed = S(0.1);
   config.linearDamping = S(0.05);
   config.angularDamping = S(0.1);
   Space<S, Layout> space(config);

@@ -56,6 +56,26 @@ TEST_CASE("Every setter refuses NaN, infinities and what is out of range, and le
        [](const auto& s) { return s.getTangentialRestitution(); },
        0.4,
        {-0.1, 1.5}},
+      {"restitutionExponent",
+       [](auto& s, double x) { s.setRestitutionExponent(x); },
+       [](const auto& s) { return s.getRestitutionExponent(); },
+       0.25,
+       {-0.1, 1.5}},
+      {"restitutionSpeed",
+       [](auto& s, double x) { s.setRestitutionSpeed(x); },
+       [](const auto& s) { return s.getRestitutionSpeed(); },
+       7.7e-5,
+       {0.0, -0.1}},
+      {"rollingFriction",
+       [](auto& s, double x) { s.setRollingFriction(x); },
+       [](const auto& s) { return s.getRollingFriction(); },
+       0.1,
+       {-0.1}},
+      {"spinningFriction",
+       [](auto& s, double x) { s.setSpinningFriction(x); },
+       [](const auto& s) { return s.getSpinningFriction(); },
+       0.1,
+       {-0.1}},
       {"linearDamping",
        [](auto& s, double x) { s.setLinearDamping(x); },
        [](const auto& s) { return s.getLinearDamping(); },
@@ -110,6 +130,10 @@ TEST_CASE("validate lists every field at fault at once, with value and range") {
   config.coeffFriction = -3.0;
   config.coeffStaticFriction = inf;
   config.tangentialRestitution = -4.0;
+  config.restitutionExponent = 1.125;
+  config.restitutionSpeed = 0.0;
+  config.rollingFriction = -8.0;
+  config.spinningFriction = -9.0;
   config.linearDamping = -5.0;
   config.angularDamping = -6.0;
   config.positionalCorrectionFactor = 7.0;
@@ -138,6 +162,10 @@ TEST_CASE("validate lists every field at fault at once, with value and range") {
                                "coeffFriction is -3;",
                                "coeffStaticFriction is inf;",
                                "tangentialRestitution is -4;",
+                               "restitutionExponent is 1.125;",
+                               "restitutionSpeed is 0;",
+                               "rollingFriction is -8;",
+                               "spinningFriction is -9;",
                                "linearDamping is -5;",
                                "angularDamping is -6;",
                                "positionalCorrectionFactor is 7;",

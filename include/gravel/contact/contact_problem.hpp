@@ -236,7 +236,9 @@ class ContactProblem {
     // Newton's law for every contact that gets an impulse (Moreau 1988): v_n^+ = -e v_n^-. One that parts and
     // is pushed back by others may so come to approach, and bounces in its turn in the next step; to stop it
     // here would make energy: J_n (v_n^- + v_n^+) > 0.
-    row.target = impact || parts ? -restitutionAt(c.material, speed) * v_n : S(0);
+    row.target = impact || parts
+                     ? -restitutionAt<S>(c.material, detail::scaled<S>(speed, -speedExponent_)) * v_n
+                     : S(0);
     row.target = impact ? row.target : std::min<S>(row.target, -allowed);
     row.target -= drift_n;
     row.slipTarget = drift_n * row.n - drift;

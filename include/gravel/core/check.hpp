@@ -68,6 +68,12 @@ inline Range<Scalar> nonNegative() {
 }
 
 template <Real Scalar>
+inline Range<Scalar> positive() {
+  return {std::is_floating_point_v<Scalar> ? std::numeric_limits<Scalar>::min() : Scalar(1e-300),
+          anyFinite<Scalar>().high, "finite, > 0"};
+}
+
+template <Real Scalar>
 inline Range<Scalar> unitInterval() {
   return {Scalar(0), Scalar(1), "0 to 1"};
 }

@@ -222,7 +222,11 @@ class ContactStage {
     return {.restitution = c.coeffRestitution,
             .staticFriction = std::max(c.coeffStaticFriction, c.coeffFriction),
             .kineticFriction = c.coeffFriction,
-            .tangentialRestitution = c.tangentialRestitution};
+            .tangentialRestitution = c.tangentialRestitution,
+            .restitutionExponent = c.restitutionExponent,
+            .restitutionSpeed = c.restitutionSpeed,
+            .rollingFriction = c.rollingFriction,
+            .spinningFriction = c.spinningFriction};
   }
 
   void checkMaterial(std::uint32_t id, const std::string& who) const {

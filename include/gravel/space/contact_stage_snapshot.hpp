@@ -29,15 +29,16 @@ void ContactStage<Scalar, Layout>::save(SnapshotWriter& out) const {
   }
   std::vector<std::uint64_t> names;
   std::vector<Scalar> places;
+  std::vector<Material<Scalar>> pairs;
   for (const Contact<Scalar>& c : contacts_) {
-    const Material<Scalar>& m = c.material;
     names.insert(names.end(), {c.first, c.second, c.key1, c.key2});
-    places.insert(places.end(),
-                  {c.normal[0], c.normal[1], c.normal[2], c.gap, c.arm1, c.arm2, c.drift[0], c.drift[1],
-                   c.drift[2], m.restitution, m.staticFriction, m.kineticFriction, m.tangentialRestitution});
+    places.insert(places.end(), {c.normal[0], c.normal[1], c.normal[2], c.gap, c.arm1, c.arm2, c.drift[0],
+                                 c.drift[1], c.drift[2]});
+    pairs.push_back(c.material);
   }
   out.array("names of contacts", names.data(), names.size());
   out.array("contacts", places.data(), places.size());
+  out.array("materials of contacts", pairs.data(), pairs.size());
   out.array("keys of impulses", keys.data(), keys.size());
   out.array("impulses", numbers.data(), numbers.size());
   out.value("step of impulses", solver_.memoryStep());
@@ -58,10 +59,11 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
   materials_ = in.array<Material<Scalar>>("materials");
   const auto names = in.array<std::uint64_t>("names of contacts");
   const std::vector<Scalar> places = in.array<Scalar>("contacts");
+  const auto pairs = in.array<Material<Scalar>>("materials of contacts");
   const auto keys = in.array<std::uint64_t>("keys of impulses");
   const std::vector<Scalar> impulses = in.array<Scalar>("impulses");
   if (sides.size() != 4 * surfaces.size() || impulses.size() != 2 * keys.size() || materials_.empty() ||
-      places.size() * 4 != names.size() * 13) {
+      places.size() * 4 != names.size() * 9 || pairs.size() * 4 != names.size()) {
     in.fail("holds lists of different lengths");
   }
   for (std::size_t p = 0; p < surfaces.size(); ++p) {
@@ -71,7 +73,7 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
   }
   for (std::size_t k = 0; k < names.size() / 4; ++k) {
     const std::uint64_t* name = &names[4 * k];
-    const Scalar* c = &places[13 * k];
+    const Scalar* c = &places[9 * k];
     contacts_.push_back({static_cast<std::uint32_t>(name[0]),
                          static_cast<std::uint32_t>(name[1]),
                          name[2],
@@ -80,7 +82,7 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
                          c[3],
                          c[4],
                          c[5],
-                         {c[9], c[10], c[11], c[12]},
+                         pairs[k],
                          {c[6], c[7], c[8]}});
   }
   std::vector<StoredImpulse<Scalar>> memory(keys.size() / 2);

@@ -30,6 +30,18 @@ class Settings {
   Scalar getTangentialRestitution() const { return config_.tangentialRestitution; }
   void setTangentialRestitution(Scalar b0) { assign(&SimulationConfig<Scalar>::tangentialRestitution, b0); }
 
+  Scalar getRestitutionExponent() const { return config_.restitutionExponent; }
+  void setRestitutionExponent(Scalar q) { assign(&SimulationConfig<Scalar>::restitutionExponent, q); }
+
+  Scalar getRestitutionSpeed() const { return config_.restitutionSpeed; }
+  void setRestitutionSpeed(Scalar speed) { assign(&SimulationConfig<Scalar>::restitutionSpeed, speed); }
+
+  Scalar getRollingFriction() const { return config_.rollingFriction; }
+  void setRollingFriction(Scalar mu_r) { assign(&SimulationConfig<Scalar>::rollingFriction, mu_r); }
+
+  Scalar getSpinningFriction() const { return config_.spinningFriction; }
+  void setSpinningFriction(Scalar mu_t) { assign(&SimulationConfig<Scalar>::spinningFriction, mu_t); }
+
   Scalar getLinearDamping() const { return config_.linearDamping; }
   void setLinearDamping(Scalar damping) { assign(&SimulationConfig<Scalar>::linearDamping, damping); }
 

@@ -32,10 +32,14 @@ struct SimulationConfig {
   IntegratorKind integrator = IntegratorKind::VelocityVerlet;
   Scalar epsilon = Scalar(1e-12);            ///< lengths [m] and speeds [m s^-1] below it count as zero
   Scalar coeffRestitution = Scalar(0.5);     ///< approach speed kept in a hit; 1 keeps all
+  Scalar restitutionExponent = Scalar(0);    ///< that falls with impact speed as v^-exponent; 0: it does not
+  Scalar restitutionSpeed = Scalar(1);       ///< [m s^-1] from this speed on
   Scalar restitutionThreshold = Scalar(0);   ///< [m s^-1] slower hits do not bounce
   Scalar coeffFriction = Scalar(0.3);        ///< kinetic: sliding force over normal force
   Scalar coeffStaticFriction = Scalar(0.4);  ///< least force that starts a slide, over normal force
   Scalar tangentialRestitution = Scalar(0);  ///< slip speed that a sticking hit turns back
+  Scalar rollingFriction = Scalar(0);        ///< rolling torque over effective radius and normal force
+  Scalar spinningFriction = Scalar(0);       ///< the same of spin about the normal
   Scalar linearDamping = Scalar(0);          ///< [s^-1] dv/dt = -c v
   Scalar angularDamping = Scalar(0);         ///< [s^-1] dw/dt = -c w
   Scalar positionalCorrectionFactor = Scalar(0.4);  ///< share of each overlap removed per step
@@ -81,9 +85,7 @@ void forEachSetting(Config& c, Visitor&& visit) {
   using S = Setting<Scalar>;
   const auto any = detail::nonNegative<Scalar>();
   const auto unit = detail::unitInterval<Scalar>();
-  auto positive = any;
-  positive.low = std::is_floating_point_v<Scalar> ? std::numeric_limits<Scalar>::min() : Scalar(1e-300);
-  positive.text = "finite, > 0";
+  const auto positive = detail::positive<Scalar>();
   auto tolerance = positive;
   tolerance.high = Scalar(1);
   tolerance.text = "> 0, <= 1";
@@ -101,10 +103,14 @@ void forEachSetting(Config& c, Visitor&& visit) {
   visit(S{"integrator", "", any}, c.integrator);
   visit(S{"epsilon", "m, m s^-1", any}, c.epsilon);
   visit(S{"coeffRestitution", "1", unit}, c.coeffRestitution);
+  visit(S{"restitutionExponent", "1", unit}, c.restitutionExponent);
+  visit(S{"restitutionSpeed", "m s^-1", positive}, c.restitutionSpeed);
   visit(S{"restitutionThreshold", "m s^-1", any}, c.restitutionThreshold);
   visit(S{"coeffFriction", "1", any}, c.coeffFriction);
   visit(S{"coeffStaticFriction", "1", any}, c.coeffStaticFriction);
   visit(S{"tangentialRestitution", "1", unit}, c.tangentialRestitution);
+  visit(S{"rollingFriction", "1", any}, c.rollingFriction);
+  visit(S{"spinningFriction", "1", any}, c.spinningFriction);
   visit(S{"linearDamping", "s^-1", any}, c.linearDamping);
   visit(S{"angularDamping", "s^-1", any}, c.angularDamping);
   visit(S{"positionalCorrectionFactor", "1", unit}, c.positionalCorrectionFactor);

@@ -216,7 +216,7 @@ template <Real Scalar, class Layout>
 auto Space<Scalar, Layout>::applyRestitutionImpulse(CollisionContext& ctx)
     -> std::tuple<Vector, Scalar, Scalar> {
   const NormalImpulse<Scalar> blow =
-      applyNormalImpulse<Scalar, Layout>(ctx, pairMaterial(ctx).restitution,
+      applyNormalImpulse<Scalar, Layout>(ctx, restitutionAt<Scalar>(pairMaterial(ctx), -ctx.normalVelocity()),
                                          std::max(this->config_.restitutionThreshold, this->config_.epsilon));
   return {blow.impulse, blow.magnitude, blow.bias};
 }
