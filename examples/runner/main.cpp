@@ -47,8 +47,9 @@ Space<double> makeSpace(const Scene& scene) {
   space.setDomain(scene.domain);
   space.setUniformField(scene.field);
   for (const ScenePlane& plane : scene.planes) {
-    space.addPlane(plane.normal, plane.offset,
-                   plane.material ? space.addMaterial(*plane.material) : defaultMaterial);
+    const std::size_t number = space.addPlane(
+        plane.normal, plane.offset, plane.material ? space.addMaterial(*plane.material) : defaultMaterial);
+    space.setPlaneVelocity(number, plane.velocity);
   }
   for (const SceneBody& entry : scene.bodies) {
     space.addBody(entry.body);

@@ -23,6 +23,7 @@ struct SceneBody {
 struct ScenePlane {
   Vector3<double> normal = Vector3<double>::UnitZ();
   double offset = 0.0;
+  Vector3<double> velocity = Vector3<double>::Zero();
   std::optional<Material<double>> material;
   std::optional<Colour> colour;  ///< not drawn without one
 };

@@ -226,6 +226,7 @@ void readPlane(TableReader& reader, const SimulationConfig<double>& config, std:
   ScenePlane plane;
   reader.vector("normal", plane.normal);
   reader.real("offset", plane.offset);
+  reader.vector("velocity", plane.velocity);
   if (!(plane.normal.stableNorm() > 0.0)) {
     reader.faults().add(reader.where(), "\"normal\" in [[plane]] is (0, 0, 0); allowed: any direction");
   } else {
@@ -250,6 +251,7 @@ void readBox(TableReader& reader, const SimulationConfig<double>& config, std::v
   std::size_t openFace = faces.size();
   reader.choice("open", faces, openFace);
   ScenePlane look;
+  reader.vector("velocity", look.velocity);
   readMaterial(reader, config, look);
   for (std::size_t face = 0; face < faces.size(); ++face) {
     if (face != openFace) {

@@ -70,8 +70,9 @@ std::vector<Pair> allPairs(const B& bodies) {
 template <class S, class B>
 std::vector<Contact<S>> contactsOf(const B& bodies, const Material<S>& material,
                                    std::vector<HalfSpace<S>> walls = {}, S margin = S(0)) {
-  for (HalfSpace<S>& wall : walls) {
-    wall.material = material;
+  for (std::size_t b = 0; b < walls.size(); ++b) {
+    walls[b].material = material;
+    walls[b].number = b;
   }
   const std::vector<Material<S>> materials{material};
   NarrowPhaseSettings<S> settings;

@@ -39,3 +39,56 @@ TEST_CASE("Planes without a direction or with numbers that are none are refused,
   CHECK_THROWS_AS(makePlane<double>({0, 0, 1}, inf), std::invalid_argument);
   CHECK_THROWS_AS(makePlane<float>({0, 0, 0}, 1.0F), std::invalid_argument);
 }
+
+TEST_CASE("A box is six planes that look inwards, without the faces that are open") {
+  const auto box = makeBox<double>({-1, -2, -3}, {4, 5, 6}, MaterialId{2});
+  REQUIRE(box.size() == 6);
+  for (std::size_t face = 0; face < 6; ++face) {
+    CAPTURE(face);
+    CHECK(box[face].material == MaterialId{2});
+    // The face passes through the corner on its side, and the middle of the box is free.
+    const Vector3<double> corner = face % 2 == 0 ? Vector3<double>(-1, -2, -3) : Vector3<double>(4, 5, 6);
+    CHECK(box[face].normal.dot(corner) == box[face].offset);
+    CHECK(box[face].normal.dot(Vector3<double>(1.5, 1.5, 1.5)) > box[face].offset);
+    CHECK(std::abs(box[face].normal[static_cast<Eigen::Index>(face / 2)]) == 1.0);
+  }
+  const auto open = makeBox<double>({-1, -2, -3}, {4, 5, 6}, {}, BoxFaces::HighZ | BoxFaces::LowX);
+  REQUIRE(open.size() == 4);
+  CHECK(open[0].normal == -Vector3<double>::UnitX());
+  CHECK(open[3].normal == Vector3<double>::UnitZ());
+}
+
+TEST_CASE("A box without an inside, and faces that there are not, are refused") {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto allowed = ContainsSubstring("low below high");
+  CHECK_THROWS_WITH(makeBox<double>({0, 0, 0}, {1, 0, 1}), ContainsSubstring("(1, 0, 1)") && allowed);
+  CHECK_THROWS_WITH(makeBox<double>({0, 0, 0}, {1, -1, 1}), allowed);
+  CHECK_THROWS_WITH(makeBox<double>({0, nan, 0}, {1, 1, 1}), ContainsSubstring("nan") && allowed);
+  CHECK_THROWS_WITH(makeBox<double>({0, 0, 0}, {1, 1, 1}, {}, static_cast<BoxFaces>(64)),
+                    ContainsSubstring("64") && ContainsSubstring("BoxFaces"));
+}
+
+TEST_CASE("Planes keep their numbers, which are never given twice") {
+  Boundaries<double> boundaries;
+  const Plane<double> floor = makePlane<double>({0, 0, 1}, 0.0);
+  CHECK(boundaries.add(floor) == 0);
+  CHECK(boundaries.add(floor) == 1);
+  boundaries.remove(1);
+  CHECK(boundaries.add(floor) == 2);
+  CHECK(boundaries.planes().size() == 2);
+  CHECK(boundaries.at(2).number == 2);
+  CHECK_THROWS_AS(boundaries.at(1), std::out_of_range);
+  CHECK_THROWS_WITH(boundaries.remove(1), ContainsSubstring("no plane has the number 1"));
+  CHECK_THROWS_AS(boundaries.setVelocity(7, {0, 0, 1}), std::out_of_range);
+  CHECK_THROWS_WITH(boundaries.setVelocity(2, {0, std::numeric_limits<double>::infinity(), 1}),
+                    ContainsSubstring("velocity of plane 2") && ContainsSubstring("inf"));
+  CHECK(boundaries.at(2).velocity == Vector3<double>::Zero());
+}
+
+TEST_CASE("A plane travels by the part of its velocity along its normal") {
+  Boundaries<double> boundaries;
+  boundaries.add(makePlane<double>({0, 3, 4}, 1.0));
+  boundaries.setVelocity(0, {7, 5, 10});
+  boundaries.advance(0.5);
+  CHECK_THAT(boundaries.at(0).offset, WithinRel(1.0 + 0.5 * 11.0, 1e-15));
+}

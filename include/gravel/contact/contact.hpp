@@ -16,7 +16,7 @@ namespace gravel {
 /// `Contact::second` of a contact with a boundary.
 inline constexpr std::uint32_t staticPartner = std::numeric_limits<std::uint32_t>::max();
 
-/// Second key of a contact with the boundary of that index; larger than any body's id below 2^63.
+/// Second key of a contact with the boundary of that number; larger than any body's id below 2^63.
 constexpr std::uint64_t boundaryKey(std::uint64_t boundary) { return boundary | (std::uint64_t{1} << 63U); }
 
 /// Two bodies, or a body and a boundary, that touch. Named by ids, so that it is recognised in the next step
@@ -26,7 +26,7 @@ struct Contact {
   std::uint32_t first;        ///< index of the body of the smaller id
   std::uint32_t second;       ///< index of the other, or `staticPartner`
   std::uint64_t key1;         ///< id of the first
-  std::uint64_t key2;         ///< id of the second, or `boundaryKey(index)`
+  std::uint64_t key2;         ///< id of the second, or `boundaryKey(number)`
   Vector3<Scalar> normal;     ///< unit vector from the first to the second
   Scalar gap;                 ///< [m] between the surfaces, < 0 is overlap
   Scalar arm1;                ///< [m] centre of the first to the contact along the normal
@@ -48,6 +48,8 @@ struct HalfSpace {
   Vector3<Scalar> normal;  ///< unit vector into the free side
   Scalar offset;           ///< [m]
   Material<Scalar> material{};
+  Vector3<Scalar> velocity = Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(0));  ///< [m s^-1] of its matter
+  std::uint64_t number = 0;  ///< by which its contacts are recognised
 };
 
 /// Where two surfaces stand: normal from 1 to 2, gap < 0 for overlap, arms from the centres.

@@ -33,21 +33,32 @@ class NarrowPhase {
  public:
   /// \param pairs candidates, sorted by ids (spatial/pair.hpp), of indices into `bodies`
   /// \param materials surface of each MaterialId that occurs
-  /// \param boundaries half-spaces with unit normals; boundary b has the key boundaryKey(b)
-  /// \throws std::invalid_argument for a material id without an entry
+  /// \param boundaries half-spaces with unit normals, in increasing order of their numbers
+  /// \param nearBoundaries indices of all bodies that may touch a boundary, increasing; without it every body
+  ///        is looked at
+  /// \throws std::invalid_argument for a material id without an entry, or boundaries out of order
   template <ContactBodies B>
   void find(std::span<const Pair> pairs, const B& bodies, const Domain<S>& domain,
             std::span<const Material<S>> materials, std::span<const HalfSpace<S>> boundaries,
-            const NarrowPhaseSettings<S>& settings, std::vector<Contact<S>>& out) {
+            const NarrowPhaseSettings<S>& settings, std::vector<Contact<S>>& out,
+            std::optional<std::span<const std::uint32_t>> nearBoundaries = std::nullopt) {
+    for (std::size_t b = 1; b < boundaries.size(); ++b) {
+      if (boundaries[b].number <= boundaries[b - 1].number) {
+        detail::refuse("number of boundary " + std::to_string(b), std::to_string(boundaries[b].number),
+                       "above that of the one before it, " + std::to_string(boundaries[b - 1].number));
+      }
+    }
     gather(pairs.size(), out, [&](std::size_t k, std::vector<Contact<S>>& part) {
       appendPair(pairs[k], bodies, domain, materials, settings, part);
     });
     const auto pairContacts = static_cast<std::ptrdiff_t>(out.size());
-    if (boundaries.empty()) {
+    if (boundaries.empty() || (nearBoundaries && nearBoundaries->empty())) {
       return;
     }
-    gather(bodies.size(), boundaryContacts_, [&](std::size_t i, std::vector<Contact<S>>& part) {
-      appendBoundaries(i, bodies, materials, boundaries, settings, part);
+    const std::size_t count = nearBoundaries ? nearBoundaries->size() : bodies.size();
+    gather(count, boundaryContacts_, [&](std::size_t k, std::vector<Contact<S>>& part) {
+      appendBoundaries(nearBoundaries ? (*nearBoundaries)[k] : k, bodies, materials, boundaries, settings,
+                       part);
     });
     const auto before = [](const Contact<S>& a, const Contact<S>& b) { return keysBefore(a, b); };
     if (!std::is_sorted(boundaryContacts_.begin(), boundaryContacts_.end(), before)) {
@@ -147,16 +158,15 @@ class NarrowPhase {
                                std::span<const HalfSpace<S>> boundaries,
                                const NarrowPhaseSettings<S>& settings, std::vector<Contact<S>>& part) {
     const S radius = bodies.radii()[i];
-    for (std::size_t b = 0; b < boundaries.size(); ++b) {
-      const HalfSpace<S>& wall = boundaries[b];
+    for (const HalfSpace<S>& wall : boundaries) {
       const S margin = marginOf(settings, radius, [&] { return accelerationOf(bodies, i); });
       const auto touch =
           sphereHalfSpace<S>(Vector3<S>(bodies.positions()[i]), radius, wall.normal, wall.offset, margin);
       if (touch && detail::isMovable(bodies, i)) {
         part.push_back(Contact<S>{static_cast<std::uint32_t>(i), staticPartner, bodies.ids()[i],
-                                  boundaryKey(b), touch->normal, touch->gap, touch->arm1, touch->arm2,
-                                  mix(surface(materials, bodies.materials()[i]), wall.material),
-                                  Vector3<S>::Zero()});
+                                  boundaryKey(wall.number), touch->normal, touch->gap, touch->arm1,
+                                  touch->arm2, mix(surface(materials, bodies.materials()[i]), wall.material),
+                                  wall.velocity});
       }
     }
   }

@@ -1,11 +1,12 @@
 #pragma once
 
 /// \file
-/// Static boundaries and uniform fields: what acts on bodies from outside.
+/// Boundaries: planes and boxes made of them, at rest or moving.
 
 #include <gravel/bodies/fields.hpp>
 #include <gravel/core/check.hpp>
 
+#include <string>
 #include <vector>
 
 namespace gravel {
@@ -17,6 +18,10 @@ struct Plane {
   Vector3<Scalar> normal;
   Scalar offset;  ///< [m]
   MaterialId material = defaultMaterial;
+  /// [m s^-1] of the plane's matter. Its part along n moves the plane; the part across n drags what rubs on
+  /// it along, as a conveyor belt does.
+  Vector3<Scalar> velocity = Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(0));
+  std::size_t number = 0;  ///< its own among the boundaries of a space, never given twice
 };
 
 /// \param normal of any length but zero; `offset` is measured along the normal made unit
@@ -31,5 +36,103 @@ Plane<Scalar> makePlane(const Vector3<Scalar>& normal, const Scalar& offset,
   detail::require("offset of the plane", offset, detail::anyFinite<Scalar>());
   return {n, offset, material};
 }
+
+/// Faces of a box; join them by |.
+enum class BoxFaces : std::uint8_t {
+  None = 0,
+  LowX = 1,
+  HighX = 2,
+  LowY = 4,
+  HighY = 8,
+  LowZ = 16,
+  HighZ = 32,
+};
+constexpr BoxFaces operator|(BoxFaces a, BoxFaces b) {
+  return static_cast<BoxFaces>(static_cast<unsigned>(a) | static_cast<unsigned>(b));
+}
+
+/// The faces of the box from `low` to `high`, looking inwards, without those that are open; in the order low
+/// x, high x, low y, high y, low z, high z.
+/// \throws std::invalid_argument unless low < high along every axis, all finite
+template <Real Scalar>
+std::vector<Plane<Scalar>> makeBox(const Vector3<Scalar>& low, const Vector3<Scalar>& high,
+                                   MaterialId material = defaultMaterial, BoxFaces open = BoxFaces::None) {
+  if (!isFinite(low) || !isFinite(high) || !(low.array() < high.array()).all()) {
+    detail::refuse("box", "from " + detail::formatVector(low) + " to " + detail::formatVector(high),
+                   "finite, low below high along every axis");
+  }
+  if (static_cast<unsigned>(open) >= 64U) {
+    detail::refuse("open faces of the box", std::to_string(static_cast<unsigned>(open)), "of BoxFaces");
+  }
+  std::vector<Plane<Scalar>> planes;
+  for (unsigned face = 0; face < 6; ++face) {
+    if ((static_cast<unsigned>(open) >> face & 1U) == 0) {
+      const auto axis = static_cast<Eigen::Index>(face / 2);
+      const bool upper = face % 2 == 1;
+      const Vector3<Scalar> n = Vector3<Scalar>::Unit(axis) * Scalar(upper ? -1 : 1);
+      planes.push_back({n, upper ? Scalar(-high[axis]) : Scalar(low[axis]), material});
+    }
+  }
+  return planes;
+}
+
+/// The planes of a space, in the order of their numbers.
+template <Real Scalar>
+class Boundaries {
+ public:
+  const std::vector<Plane<Scalar>>& planes() const { return planes_; }
+  bool empty() const { return planes_.empty(); }
+  /// The number that the next plane gets.
+  std::size_t next() const { return next_; }
+
+  /// \return the plane's number
+  std::size_t add(Plane<Scalar> plane) {
+    plane.number = next_;
+    planes_.push_back(plane);
+    return next_++;
+  }
+
+  /// Takes over planes with their numbers, in increasing order and below `next`.
+  void assign(std::vector<Plane<Scalar>> planes, std::size_t next) {
+    planes_ = std::move(planes);
+    next_ = next;
+  }
+
+  /// \throws std::out_of_range if there is no plane of that number
+  const Plane<Scalar>& at(std::size_t number) const { return planes_[indexOf(number)]; }
+
+  void remove(std::size_t number) {
+    planes_.erase(planes_.begin() + static_cast<std::ptrdiff_t>(indexOf(number)));
+  }
+
+  /// \throws std::invalid_argument for a velocity that is not finite; std::out_of_range as above
+  void setVelocity(std::size_t number, const Vector3<Scalar>& velocity) {
+    Plane<Scalar>& plane = planes_[indexOf(number)];
+    if (!isFinite(velocity)) {
+      detail::refuse("velocity of plane " + std::to_string(number), detail::formatVector(velocity), "finite");
+    }
+    plane.velocity = velocity;
+  }
+
+  /// Moves every plane by its velocity over h [s].
+  void advance(const Scalar& h) {
+    for (Plane<Scalar>& plane : planes_) {
+      plane.offset += plane.normal.dot(plane.velocity) * h;
+    }
+  }
+
+ private:
+  std::size_t indexOf(std::size_t number) const {
+    for (std::size_t p = 0; p < planes_.size(); ++p) {
+      if (planes_[p].number == number) {
+        return p;
+      }
+    }
+    throw std::out_of_range("gravel: no plane has the number " + std::to_string(number));
+  }
+
+  std::vector<Plane<Scalar>> planes_;
+  std::size_t next_ = 0;
+};
 
 }  // namespace gravel

@@ -3,6 +3,7 @@
 /// \file
 /// The collision part of a step: candidates, contacts, overlap, impulses.
 
+#include <gravel/contact/boundary_list.hpp>
 #include <gravel/contact/contact_solver.hpp>
 #include <gravel/contact/narrow_phase.hpp>
 #include <gravel/core/profiler.hpp>
@@ -21,7 +22,7 @@ class ContactStage {
   using Config = SimulationConfig<Scalar>;
 
   Domain<Scalar> domain;
-  std::vector<Plane<Scalar>> planes;
+  Boundaries<Scalar> boundaries;
 
   const std::vector<Contact<Scalar>>& contacts() const { return contacts_; }
   const ContactReport<Scalar>& report() const { return report_; }
@@ -77,24 +78,41 @@ class ContactStage {
       profiler.skip(Phase::NarrowPhase, reason);
       return;
     }
+    Scalar largest(0);
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      largest = std::max<Scalar>(largest, bodies.radii()[i]);
+    }
+    const Scalar margin = Scalar(2) * largest * NarrowPhase<Scalar>::restingMargin();
     {
       const Profiler::Scope scope(profiler, Phase::NeighbourSearch);
       neighbours_.setKind(config.broadPhase);
-      Scalar largest(0);
-      for (std::size_t i = 0; i < bodies.size(); ++i) {
-        largest = std::max<Scalar>(largest, bodies.radii()[i]);
-      }
       neighbours_.update(bodies.positions(), bodies.radii(), bodies.ids(), bodies.revision(), domain, time,
-                         Scalar(Scalar(2) * largest * NarrowPhase<Scalar>::restingMargin()));
+                         margin);
     }
     const Profiler::Scope scope(profiler, Phase::NarrowPhase);
     materials_[0] = defaultOf(config);
     walls_.clear();
-    for (const Plane<Scalar>& plane : planes) {
-      walls_.push_back({plane.normal, plane.offset, materials_[static_cast<std::size_t>(plane.material)]});
+    for (const Plane<Scalar>& plane : boundaries.planes()) {
+      walls_.push_back({plane.normal, plane.offset, materials_[static_cast<std::size_t>(plane.material)],
+                        plane.velocity, plane.number});
+    }
+    std::optional<std::span<const std::uint32_t>> nearWalls;
+    if (domain.isOpen()) {
+      nearWalls = nearWalls_.update(bodies.positions(), bodies.radii(), walls_, neighbours_.rebuilt(),
+                                    neighbours_.skin(), margin);
     }
     narrow_.find(neighbours_.pairs(), bodies, domain, materials_, walls_,
-                 {time, config.epsilon, Scalar(0), h}, contacts_);
+                 {time, config.epsilon, Scalar(0), h}, contacts_, nearWalls);
+  }
+
+  /// The plane moves on at another velocity; what rests on it feels that at once.
+  void setPlaneVelocity(std::size_t plane, const Vector3<Scalar>& velocity) {
+    boundaries.setVelocity(plane, velocity);
+    for (Contact<Scalar>& c : contacts_) {
+      if (c.second == staticPartner && c.key2 == boundaryKey(plane)) {
+        c.drift = velocity;
+      }
+    }
   }
 
   /// Shrinks overlaps by moving bodies, and renews the geometry of the contacts, so that impulses act where
@@ -274,7 +292,9 @@ class ContactStage {
       const Vector3<Scalar> x1 = bodies.positions()[c.first];
       const Scalar r1 = bodies.radii()[c.first];
       if (c.second == staticPartner) {
-        const HalfSpace<Scalar>& wall = walls_[static_cast<std::size_t>(c.key2 - boundaryKey(0))];
+        const HalfSpace<Scalar>& wall = *std::lower_bound(
+            walls_.begin(), walls_.end(), c.key2 - boundaryKey(0),
+            [](const HalfSpace<Scalar>& w, std::uint64_t number) { return w.number < number; });
         const Scalar gap = wall.normal.dot(x1) - wall.offset - r1;
         c.gap = c.gap > Scalar(0) ? gap : std::min<Scalar>(gap, Scalar(0));
         return;
@@ -294,7 +314,7 @@ class ContactStage {
   }
 
   const char* reasonToSkip(const Bodies& bodies) const {
-    if (bodies.size() < 2 && planes.empty()) {
+    if (bodies.size() < 2 && boundaries.empty()) {
       return "one body and no boundary";
     }
     for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -308,6 +328,7 @@ class ContactStage {
   std::vector<Material<Scalar>> materials_ = std::vector<Material<Scalar>>(1);  // 0 is the space's own
   std::vector<HalfSpace<Scalar>> walls_;
   NeighbourList<Scalar> neighbours_;
+  BoundaryList<Scalar> nearWalls_;
   NarrowPhase<Scalar> narrow_;
   std::vector<Contact<Scalar>> contacts_;
   ContactSolver<Scalar> solver_;

@@ -13,12 +13,17 @@ void ContactStage<Scalar, Layout>::save(SnapshotWriter& out) const {
   out.array("domain lengths", domain.lengths().data(), 3);
   std::vector<Scalar> numbers;
   std::vector<std::uint32_t> surfaces;
-  for (const Plane<Scalar>& plane : planes) {
-    numbers.insert(numbers.end(), {plane.normal[0], plane.normal[1], plane.normal[2], plane.offset});
+  std::vector<std::uint64_t> planeNumbers;
+  for (const Plane<Scalar>& plane : boundaries.planes()) {
+    numbers.insert(numbers.end(), {plane.normal[0], plane.normal[1], plane.normal[2], plane.offset,
+                                   plane.velocity[0], plane.velocity[1], plane.velocity[2]});
     surfaces.push_back(static_cast<std::uint32_t>(plane.material));
+    planeNumbers.push_back(plane.number);
   }
+  planeNumbers.push_back(boundaries.next());
   out.array("planes", numbers.data(), numbers.size());
   out.array("materials of planes", surfaces.data(), surfaces.size());
+  out.array("numbers of planes", planeNumbers.data(), planeNumbers.size());
   out.array("materials", materials_.data(), materials_.size());
   std::vector<std::uint64_t> keys;
   numbers.clear();
@@ -56,21 +61,29 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
   }
   const std::vector<Scalar> sides = in.array<Scalar>("planes");
   const auto surfaces = in.array<std::uint32_t>("materials of planes");
+  const auto planeNumbers = in.array<std::uint64_t>("numbers of planes");
   materials_ = in.array<Material<Scalar>>("materials");
   const auto names = in.array<std::uint64_t>("names of contacts");
   const std::vector<Scalar> places = in.array<Scalar>("contacts");
   const auto pairs = in.array<Material<Scalar>>("materials of contacts");
   const auto keys = in.array<std::uint64_t>("keys of impulses");
   const std::vector<Scalar> impulses = in.array<Scalar>("impulses");
-  if (sides.size() != 4 * surfaces.size() || impulses.size() != 2 * keys.size() || materials_.empty() ||
-      places.size() * 4 != names.size() * 9 || pairs.size() * 4 != names.size()) {
+  if (sides.size() != 7 * surfaces.size() || planeNumbers.size() != surfaces.size() + 1 ||
+      impulses.size() != 2 * keys.size() || materials_.empty() || places.size() * 4 != names.size() * 9 ||
+      pairs.size() * 4 != names.size()) {
     in.fail("holds lists of different lengths");
   }
+  std::vector<Plane<Scalar>> planes;
   for (std::size_t p = 0; p < surfaces.size(); ++p) {
     checkMaterial(surfaces[p], "plane " + std::to_string(p));
-    const Scalar* side = &sides[4 * p];
-    planes.push_back({{side[0], side[1], side[2]}, side[3], MaterialId{surfaces[p]}});
+    const Scalar* side = &sides[7 * p];
+    planes.push_back({{side[0], side[1], side[2]},
+                      side[3],
+                      MaterialId{surfaces[p]},
+                      {side[4], side[5], side[6]},
+                      static_cast<std::size_t>(planeNumbers[p])});
   }
+  boundaries.assign(std::move(planes), static_cast<std::size_t>(planeNumbers.back()));
   for (std::size_t k = 0; k < names.size() / 4; ++k) {
     const std::uint64_t* name = &names[4 * k];
     const Scalar* c = &places[9 * k];

@@ -67,8 +67,24 @@ class Space : public Settings<Scalar> {
 
   // The world around them.
 
-  /// The half-space normal.x >= offset [m] is free. \return its index among the boundaries
+  /// The half-space normal.x >= offset [m] is free. \return the plane's number, which no other plane of this
+  /// space ever gets
   std::size_t addPlane(const Vector& normal, Scalar offset, MaterialId material = defaultMaterial);
+  /// Planes that look into the box from `low` to `high` [m], but for the faces that are open. \return their
+  /// numbers in the order low x, high x, low y, high y, low z, high z, without the open ones
+  std::vector<std::size_t> addBox(const Vector& low, const Vector& high,
+                                  MaterialId material = defaultMaterial, BoxFaces open = BoxFaces::None);
+  /// \throws std::out_of_range if no plane has this number
+  void removePlane(std::size_t plane);
+  /// From now on the plane moves at this velocity [m s^-1]: along its normal it travels, across it drags what
+  /// rubs on it. Set it anew before each step for any motion, V = (x(t + h) - x(t))/h for a given path. What
+  /// a moving plane does to bodies is booked in the ledger as `work`. \throws std::out_of_range as above;
+  /// std::invalid_argument for a velocity that is not finite
+  void setPlaneVelocity(std::size_t plane, const Vector& velocity) {
+    contact_.setPlaneVelocity(plane, velocity);
+  }
+  /// As they stand now, in the order of their numbers.
+  const std::vector<Plane<Scalar>>& planes() const { return contact_.boundaries.planes(); }
   /// \throws std::invalid_argument on coefficients out of range
   MaterialId addMaterial(const Material<Scalar>& material);
   /// \param g acceleration [m s^-2] of every movable body

@@ -78,8 +78,24 @@ void Space<Scalar, Layout>::reorderBodies() {
 template <Real Scalar, class Layout>
 std::size_t Space<Scalar, Layout>::addPlane(const Vector& normal, Scalar offset, MaterialId material) {
   contact_.checkMaterial(material);
-  contact_.planes.push_back(makePlane(normal, offset, material));
-  return contact_.planes.size() - 1;
+  return contact_.boundaries.add(makePlane(normal, offset, material));
+}
+
+template <Real Scalar, class Layout>
+std::vector<std::size_t> Space<Scalar, Layout>::addBox(const Vector& low, const Vector& high,
+                                                       MaterialId material, BoxFaces open) {
+  contact_.checkMaterial(material);
+  std::vector<std::size_t> numbers;
+  for (const Plane<Scalar>& face : makeBox(low, high, material, open)) {
+    numbers.push_back(contact_.boundaries.add(face));
+  }
+  return numbers;
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::removePlane(std::size_t plane) {
+  contact_.boundaries.remove(plane);
+  forcesValid_ = false;  // contacts are looked for again before the next step
 }
 
 template <Real Scalar, class Layout>

@@ -73,6 +73,7 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration) {
     contact_.beginStep();
     const Departure departure{this};
     const auto arrival = [&] {
+      contact_.boundaries.advance(h);
       contact_.wrap(bodies_, Scalar(time_ + h));
       contact_.detect(bodies_, this->config_, Scalar(time_ + h), h, profiler_);
       contact_.separate(bodies_, this->config_, Scalar(time_ + h), profiler_);
@@ -90,6 +91,7 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration) {
     resolveCollisions();
     left_.restitution += contact_.report().restitutionLoss;
     left_.friction += contact_.report().frictionLoss;
+    left_.work -= contact_.report().driftWork;
     applyDamping();
     if (force_.hook) {
       hookPower_ = force_.hookPower(bodies_);
@@ -195,7 +197,7 @@ void Space<Scalar, Layout>::updateAdaptiveTimeStep() {
   }
   const Profiler::Scope scope(profiler_, Phase::TimeStep);
   const StepLimits<Scalar> limits{c.timeStepFactor, c.minTimeStep, c.timeStep};
-  dt_ = stepFromMotion(bodies_, c.softening, limits, !contact_.planes.empty());
+  dt_ = stepFromMotion(bodies_, c.softening, limits, !contact_.boundaries.empty());
 }
 
 template <Real Scalar, class Layout>

@@ -1,0 +1,209 @@
+#include "laws/laws.hpp"
+#include "scenes/scenes.hpp"
+#include "support/catch.hpp"
+#include "support/temporary_file.hpp"
+
+// Planes that move, leave and come; boxes.
+
+using namespace gravel;
+using namespace gravel::test;
+
+namespace {
+
+const double g = 9.81;
+
+Space<double> onFloor(double dt, double friction = 0.0) {
+  SimulationConfig<double> config = plain(dt);
+  config.coeffFriction = config.coeffStaticFriction = friction;
+  config.coeffRestitution = 0.5;
+  Space<double> space(config);
+  space.addPlane({0, 0, 1}, 0.0);
+  space.setUniformField({0, 0, -g});
+  return space;
+}
+
+}  // namespace
+
+TEST_CASE("A floor that rises evenly lifts what rests on it, and does its work") {
+  Space<double> space = onFloor(1e-2);
+  space.addBody(ball({0, 0, 1}, {0, 0, 2}, 1.0, 3.0));
+  space.setPlaneVelocity(0, {0, 0, 2});
+  const double before = space.energyLedger().total();
+  advance(space, 200);
+  CHECK_THAT(space.planes()[0].offset, WithinRel(4.0, 1e-14));
+  CHECK_THAT(space.body(0).position()[2], WithinRel(5.0, 1e-13));
+  const EnergyLedger<double> ledger = space.energyLedger();
+  // 200 steps book 3 x 9.81 x 2 x 0.01 each.
+  CHECK_THAT(-ledger.work, WithinRel(3 * g * 4.0, 1e-12));
+  CHECK_THAT(ledger.total(), WithinAbs(before, 1e-12 * 3 * g * 4.0));
+  CHECK(std::abs(ledger.restitution) < 1e-12 * 3 * g * 4.0);
+}
+
+TEST_CASE("A piston of speed V turns -v into v + 2V for an elastic ball, and books the energy as work") {
+  SimulationConfig<double> config = plain(1e-3);
+  config.coeffRestitution = 1.0;
+  Space<double> space(config);
+  const std::size_t piston = space.addPlane({0, 0, 1}, -1.0);
+  space.addBody(ball({0, 0, 1}, {0, 0, -3}, 0.5, 2.0));
+  space.setPlaneVelocity(piston, {0, 0, 0.75});
+  advance(space, 1000);
+  CHECK_THAT(space.body(0).velocity()[2], WithinRel(3 + 2 * 0.75, 1e-15));
+  CHECK_THAT(-space.energyLedger().work, WithinRel(4.5 * 4.5 - 9.0, 1e-14));
+  CHECK_THAT(space.energyLedger().total(), WithinRel(9.0, 1e-14));
+}
+
+// In the frame of the belt: a ball that starts to slide at V rolls at 5/7 V from t = 2 V/(7 mu g) on (case B5
+// of the contact theory page); on the ground that is 2/7 V.
+TEST_CASE("A conveyor belt drags a ball from rest to rolling at 2/7 of its speed") {
+  const double V = 1.4;
+  const double mu = 0.25;
+  const double dt = 1e-3;
+  Space<double> space = onFloor(dt, mu);
+  space.addBody(ball({0, 0, 0.1}, {0, 0, 0}, 0.1, 2.0));
+  const std::size_t belt = 0;
+  space.setPlaneVelocity(belt, {V, 0, 0});
+  const double rollsAt = 2 * V / (7 * mu * g);
+  const auto steps = static_cast<std::size_t>(rollsAt / dt);
+  advance(space, steps);
+  // Still sliding: the acceleration is mu g, to rounding of some hundred steps.
+  CHECK_THAT(space.body(0).velocity()[0], WithinRel(mu * g * dt * static_cast<double>(steps), 1e-12));
+  advance(space, 50);
+  const double v = space.body(0).velocity()[0];
+  CHECK_THAT(v, WithinRel(2.0 / 7.0 * V, 1e-12));
+  CHECK_THAT(v - 0.1 * space.body(0).angularVelocity()[1], WithinRel(V, 1e-12));  // no slip on the belt
+  const EnergyLedger<double> ledger = space.energyLedger();
+  const double scale = V * V;
+  CHECK_THAT(ledger.total(), WithinAbs(2.0 * g * 0.1, 1e-12 * scale));
+  // Work of the belt V m v_f; half of the relative energy that B5 loses, m V^2/7, is friction.
+  CHECK_THAT(-ledger.work, WithinRel(2.0 * V * 2.0 / 7.0 * V, 1e-9));
+  CHECK_THAT(ledger.friction, WithinRel(2.0 * V * V / 7.0, 1e-9));
+  CHECK(space.planes()[belt].offset == 0.0);
+}
+
+// A plate that shakes with less than g carries the ball along: position to the gap that a resting contact may
+// have, force (over a step from t on) m (g + a(t)) to second order: a central difference of the prescribed
+// path has the relative error (omega dt)^2/12 there. (The first step starts from a plate at rest.)
+TEST_CASE("A shaking plate that never falls faster than g carries the ball, with the force m (g + a)") {
+  const double A = 0.01;
+  const double omega = 20.0;  // A omega^2 = 4 m/s^2
+  const double dt = 1e-3;
+  SimulationConfig<double> config = plain(dt);
+  config.coeffRestitution = 0.0;
+  Space<double> space(config);
+  const std::size_t plate = space.addPlane({0, 0, 1}, 0.0);
+  space.setUniformField({0, 0, -g});
+  space.addBody(ball({0, 0, 0.5}, {0, 0, 0}, 0.5, 2.0));
+  const auto height = [&](double t) { return A * (1 - std::cos(omega * t)); };
+  double worstForce = 0.0;
+  for (std::size_t i = 0; i < 1000; ++i) {
+    const double t = space.time();
+    space.setPlaneVelocity(plate, {0, 0, (height(t + dt) - height(t)) / dt});
+    space.computeDynamics(i);
+    REQUIRE_THAT(space.body(0).position()[2] - 0.5, WithinAbs(height(space.time()), 1e-7));
+    REQUIRE(space.contactCount() == 1);
+    const double force = space.contactImpulses()[0].normal / dt;
+    const double mean = 2.0 * (g + A * omega * omega * std::cos(omega * t));
+    worstForce = i == 0 ? 0.0 : std::max(worstForce, std::abs(force - mean));
+  }
+  CHECK_THAT(worstForce, WithinRel(2.0 * A * omega * omega * std::pow(omega * dt, 2) / 12.0, 0.01));
+}
+
+TEST_CASE("A plane that is removed holds nothing any more, and one that comes does") {
+  Space<double> space = onFloor(1e-3);
+  space.addBody(ball({0, 0, 0.5}, {0, 0, 0}, 0.5));
+  advance(space, 100);
+  CHECK(space.contactCount() == 1);
+  space.removePlane(0);
+  advance(space, 100);
+  CHECK(space.contactCount() == 0);
+  CHECK_THAT(space.body(0).velocity()[2], WithinRel(-g * 0.1, 1e-12));
+  CHECK_THROWS_AS(space.removePlane(0), std::out_of_range);
+  CHECK_THROWS_AS(space.setPlaneVelocity(0, {0, 0, 0}), std::out_of_range);
+  CHECK(space.addPlane({0, 0, 1}, -1.0) == 1);
+  advance(space, 2000);
+  CHECK(space.contactCount() == 1);
+  CHECK_THAT(space.body(0).position()[2], WithinAbs(-0.5, 1e-6));
+}
+
+TEST_CASE("A box keeps an elastic gas and its energy; an open face lets it out") {
+  SimulationConfig<double> config = plain(2e-3);
+  config.coeffRestitution = 1.0;
+  Space<double> space(config);
+  CHECK_THROWS_AS(space.addBox({0, 0, 0}, {0, 1, 1}), std::invalid_argument);
+  CHECK(space.planes().empty());
+  const auto faces = space.addBox({-2, -2, -2}, {2, 2, 2});
+  CHECK(faces == std::vector<std::size_t>{0, 1, 2, 3, 4, 5});
+  const CounterRandom random(11);
+  for (std::uint64_t i = 0; i < 64; ++i) {
+    const Vec cell(double(i % 4), double(i / 4 % 4), double(i / 16));
+    space.addBody(ball(cell - Vec::Constant(1.5), random.direction(i), 0.2));
+  }
+  advance(space, 1500);
+  // 64 bodies of speed 1 for 3 s: each meets a wall about twice.
+  for (std::size_t i = 0; i < space.n(); ++i) {
+    CHECK(space.body(i).position().cwiseAbs().maxCoeff() < 1.81);
+  }
+  CHECK_THAT(space.energyLedger().kinetic, WithinRel(32.0, 1e-12));
+  space.removePlane(faces[5]);
+  advance(space, 5000);
+  std::size_t out = 0;
+  for (std::size_t i = 0; i < space.n(); ++i) {
+    CHECK(space.body(i).position()[2] > -1.81);
+    out += space.body(i).position()[2] > 2.2 ? 1 : 0;
+  }
+  CHECK(out > 16);
+  CHECK_THAT(space.energyLedger().kinetic, WithinRel(32.0, 1e-12));
+}
+
+TEST_CASE("Moving planes and their numbers survive a restart, bit for bit") {
+  const auto scene = [] {
+    Space<double> space = onFloor(2e-3, 0.4);
+    space.addPlane({1, 0, 0}, -3.0);
+    space.addPlane({-1, 0, 0}, -3.0);
+    space.removePlane(1);
+    space.setPlaneVelocity(0, {0.3, 0, 0.1});
+    space.setPlaneVelocity(2, {-0.4, 0.2, 0});
+    for (int i = 0; i < 12; ++i) {
+      space.addBody(ball({0.9 * (i % 4), 0.9 * (i / 4), 0.6 + 0.1 * i}, {0, 0, 0}, 0.4));
+    }
+    return space;
+  };
+  const TemporaryFile file("moving-planes");
+  Space<double> whole = scene();
+  advance(whole, 600);
+  whole.save(file.path());
+  Space<double> again;
+  again.restore(file.path());
+  CHECK(again.planes().size() == 2);
+  CHECK(again.planes()[1].number == 2);
+  CHECK(again.planes()[1].velocity == Vec(-0.4, 0.2, 0));
+  CHECK(whole.contactCount() > 5);
+  advance(whole, 300);
+  advance(again, 300);
+  CHECK(sameBits(stateOf(whole), stateOf(again)));
+  CHECK(again.planes()[0].offset == whole.planes()[0].offset);
+  CHECK(again.addPlane({0, 1, 0}, -5) == 3);
+}
+
+TEST_CASE("Walls far away change no bit, at rest or moving") {
+  const auto run = [](bool walls) {
+    SimulationConfig<double> config = plain(2e-3);
+    Space<double> space(config);
+    if (walls) {
+      space.addBox(Vec::Constant(-1e3), Vec::Constant(1e3));
+      space.setPlaneVelocity(0, {1, 0, 0});
+    }
+    scenes::CloudOptions options;
+    options.count = 60;
+    options.radius = 1.0;
+    options.bodyRadius = {0.05, 0.15};
+    options.velocityDispersion = 0.7;
+    for (Body<double> body : scenes::rubbleCloud<double>(options)) {
+      body.velocity -= 2 * body.position;
+      space.addBody(body);
+    }
+    advance(space, 200);
+    return stateOf(space);
+  };
+  CHECK(sameBits(run(false), run(true)));
+}
