@@ -10,6 +10,7 @@
 #include <gravel/dynamics/boundary.hpp>
 #include <gravel/output/snapshot.hpp>
 #include <gravel/space/force_stage.hpp>
+#include <gravel/space/material_table.hpp>
 #include <gravel/space/simulation_config.hpp>
 #include <gravel/spatial/neighbour_list.hpp>
 
@@ -23,35 +24,10 @@ class ContactStage {
 
   Domain<Scalar> domain;
   Boundaries<Scalar> boundaries;
+  MaterialTable<Scalar> materials;
 
   const std::vector<Contact<Scalar>>& contacts() const { return contacts_; }
   const ContactReport<Scalar>& report() const { return report_; }
-
-  MaterialId addMaterial(const Material<Scalar>& material) {
-    validate(material, "the new material");
-    materials_.push_back(material);
-    return MaterialId{static_cast<std::uint32_t>(materials_.size() - 1)};
-  }
-
-  void checkMaterial(MaterialId id) const {
-    checkMaterial(static_cast<std::uint32_t>(id), "the body or plane");
-  }
-
-  void checkMaterials(const Bodies& bodies) const {
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      if (bodies.materials()[i] >= materials_.size()) {
-        checkMaterial(bodies.materials()[i], "body " + std::to_string(bodies.ids()[i]));
-      }
-    }
-  }
-
-  /// The surfaces of two materials in contact, mixed.
-  Material<Scalar> pairMaterial(MaterialId a, MaterialId b, const Config& config) const {
-    const auto surface = [&](MaterialId id) {
-      return id == defaultMaterial ? defaultOf(config) : materials_[static_cast<std::size_t>(id)];
-    };
-    return mix(surface(a), surface(b));
-  }
 
   /// Brings bodies that left a periodic box back in through the other side.
   void wrap(Bodies& bodies, const Scalar& time) const {
@@ -90,10 +66,10 @@ class ContactStage {
                          margin);
     }
     const Profiler::Scope scope(profiler, Phase::NarrowPhase);
-    materials_[0] = defaultOf(config);
+    const std::vector<Material<Scalar>>& surfaces = materials.renewed(config);
     walls_.clear();
     for (const Plane<Scalar>& plane : boundaries.planes()) {
-      walls_.push_back({plane.normal, plane.offset, materials_[static_cast<std::size_t>(plane.material)],
+      walls_.push_back({plane.normal, plane.offset, surfaces[static_cast<std::size_t>(plane.material)],
                         plane.velocity, plane.number});
     }
     std::optional<std::span<const std::uint32_t>> nearWalls;
@@ -101,8 +77,8 @@ class ContactStage {
       nearWalls = nearWalls_.update(bodies.positions(), bodies.radii(), walls_, neighbours_.rebuilt(),
                                     neighbours_.skin(), margin);
     }
-    narrow_.find(neighbours_.pairs(), bodies, domain, materials_, walls_,
-                 {time, config.epsilon, Scalar(0), h}, contacts_, nearWalls);
+    narrow_.find(neighbours_.pairs(), bodies, domain, surfaces, walls_, {time, config.epsilon, Scalar(0), h},
+                 contacts_, nearWalls);
   }
 
   /// The plane moves on at another velocity; what rests on it feels that at once.
@@ -236,25 +212,6 @@ class ContactStage {
   void load(SnapshotReader& in);
 
  private:
-  static Material<Scalar> defaultOf(const Config& c) {
-    return {.restitution = c.coeffRestitution,
-            .staticFriction = std::max(c.coeffStaticFriction, c.coeffFriction),
-            .kineticFriction = c.coeffFriction,
-            .tangentialRestitution = c.tangentialRestitution,
-            .restitutionExponent = c.restitutionExponent,
-            .restitutionSpeed = c.restitutionSpeed,
-            .rollingFriction = c.rollingFriction,
-            .spinningFriction = c.spinningFriction};
-  }
-
-  void checkMaterial(std::uint32_t id, const std::string& who) const {
-    if (id >= materials_.size()) {
-      detail::refuse(
-          "material of " + who, std::to_string(id),
-          "0 (the space's own) or a material of addMaterial, below " + std::to_string(materials_.size()));
-    }
-  }
-
   /// The share of the first half step's impulses J in the work of gravity and the field over the step. Kicks
   /// do the work m a.(v before + v after) kick/2, and the drift takes it out of the potential at the velocity
   /// in between. What J changes in the drift and in all later kicks, but not in the first one, leaves
@@ -325,7 +282,6 @@ class ContactStage {
     return "no body has a radius";
   }
 
-  std::vector<Material<Scalar>> materials_ = std::vector<Material<Scalar>>(1);  // 0 is the space's own
   std::vector<HalfSpace<Scalar>> walls_;
   NeighbourList<Scalar> neighbours_;
   BoundaryList<Scalar> nearWalls_;

@@ -24,7 +24,7 @@ void ContactStage<Scalar, Layout>::save(SnapshotWriter& out) const {
   out.array("planes", numbers.data(), numbers.size());
   out.array("materials of planes", surfaces.data(), surfaces.size());
   out.array("numbers of planes", planeNumbers.data(), planeNumbers.size());
-  out.array("materials", materials_.data(), materials_.size());
+  out.array("materials", materials.entries().data(), materials.entries().size());
   std::vector<std::uint64_t> keys;
   numbers.clear();
   for (const StoredImpulse<Scalar>& stored : solver_.memory()) {
@@ -62,20 +62,21 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
   const std::vector<Scalar> sides = in.array<Scalar>("planes");
   const auto surfaces = in.array<std::uint32_t>("materials of planes");
   const auto planeNumbers = in.array<std::uint64_t>("numbers of planes");
-  materials_ = in.array<Material<Scalar>>("materials");
+  auto surfacesOf = in.array<Material<Scalar>>("materials");
   const auto names = in.array<std::uint64_t>("names of contacts");
   const std::vector<Scalar> places = in.array<Scalar>("contacts");
   const auto pairs = in.array<Material<Scalar>>("materials of contacts");
   const auto keys = in.array<std::uint64_t>("keys of impulses");
   const std::vector<Scalar> impulses = in.array<Scalar>("impulses");
   if (sides.size() != 7 * surfaces.size() || planeNumbers.size() != surfaces.size() + 1 ||
-      impulses.size() != 2 * keys.size() || materials_.empty() || places.size() * 4 != names.size() * 9 ||
+      impulses.size() != 2 * keys.size() || surfacesOf.empty() || places.size() * 4 != names.size() * 9 ||
       pairs.size() * 4 != names.size()) {
     in.fail("holds lists of different lengths");
   }
+  materials.assign(std::move(surfacesOf));
   std::vector<Plane<Scalar>> planes;
   for (std::size_t p = 0; p < surfaces.size(); ++p) {
-    checkMaterial(surfaces[p], "plane " + std::to_string(p));
+    materials.check(surfaces[p], "plane " + std::to_string(p));
     const Scalar* side = &sides[7 * p];
     planes.push_back({{side[0], side[1], side[2]},
                       side[3],

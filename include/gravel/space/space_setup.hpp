@@ -46,7 +46,7 @@ std::size_t Space<Scalar, Layout>::checkedIndex(std::size_t i) const {
 
 template <Real Scalar, class Layout>
 BodyId Space<Scalar, Layout>::addBody(const Body<Scalar>& body) {
-  contact_.checkMaterial(body.material);
+  contact_.materials.check(static_cast<std::uint32_t>(body.material), "the body or plane");
   const BodyId id = bodies_.add(body);
   forcesValid_ = false;
   if (ledgerOpen_) {
@@ -77,14 +77,14 @@ void Space<Scalar, Layout>::reorderBodies() {
 
 template <Real Scalar, class Layout>
 std::size_t Space<Scalar, Layout>::addPlane(const Vector& normal, Scalar offset, MaterialId material) {
-  contact_.checkMaterial(material);
+  contact_.materials.check(static_cast<std::uint32_t>(material), "the body or plane");
   return contact_.boundaries.add(makePlane(normal, offset, material));
 }
 
 template <Real Scalar, class Layout>
 std::vector<std::size_t> Space<Scalar, Layout>::addBox(const Vector& low, const Vector& high,
                                                        MaterialId material, BoxFaces open) {
-  contact_.checkMaterial(material);
+  contact_.materials.check(static_cast<std::uint32_t>(material), "the body or plane");
   std::vector<std::size_t> numbers;
   for (const Plane<Scalar>& face : makeBox(low, high, material, open)) {
     numbers.push_back(contact_.boundaries.add(face));
@@ -100,7 +100,7 @@ void Space<Scalar, Layout>::removePlane(std::size_t plane) {
 
 template <Real Scalar, class Layout>
 MaterialId Space<Scalar, Layout>::addMaterial(const Material<Scalar>& material) {
-  return contact_.addMaterial(material);
+  return contact_.materials.add(material);
 }
 
 template <Real Scalar, class Layout>

@@ -113,7 +113,7 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration) {
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::prepare() {
   bodies_.validateAll();
-  contact_.checkMaterials(bodies_);
+  contact_.materials.check(bodies_);
   if (!forcesValid_ || placesChanged()) {
     applyGravity();
     buildCollisionGraph();
@@ -211,7 +211,7 @@ void Space<Scalar, Layout>::handleCollision(BodyProxy& b1, BodyProxy& b2) {
 
 template <Real Scalar, class Layout>
 Material<Scalar> Space<Scalar, Layout>::pairMaterial(const CollisionContext& ctx) const {
-  return contact_.pairMaterial(ctx.body1.material(), ctx.body2.material(), this->config_);
+  return contact_.materials.pair(ctx.body1.material(), ctx.body2.material(), this->config_);
 }
 
 template <Real Scalar, class Layout>
