@@ -10,8 +10,10 @@ using namespace gravel::test;
 
 namespace {
 
-constexpr IntegratorKind kinds[] = {IntegratorKind::VelocityVerlet, IntegratorKind::Yoshida4,
-                                    IntegratorKind::Yoshida6};
+constexpr IntegratorKind kinds[] = {
+    IntegratorKind::VelocityVerlet, IntegratorKind::Yoshida4,    IntegratorKind::Yoshida6,
+    IntegratorKind::Yoshida8,       IntegratorKind::BlanesMoan4, IntegratorKind::BlanesMoan6,
+    IntegratorKind::KahanLi6,       IntegratorKind::KahanLi8,    IntegratorKind::ForceGradient4};
 
 long double twoPi() { return 2 * pi<long double>(); }
 
@@ -35,29 +37,49 @@ long double oscillatorError(IntegratorKind kind, int n) {
 
 }  // namespace
 
-TEST_CASE("Stage weights are a palindrome with the sum 1, and their odd power sums vanish up to the order") {
+TEST_CASE("Kicks and drifts are palindromes of sum 1") {
   for (const IntegratorKind kind : kinds) {
     const IntegratorTraits traits = traitsOf(kind);
     CAPTURE(traits.name);
-    const auto w = traits.weights;
-    REQUIRE(w.size() == static_cast<std::size_t>(traits.forceEvaluations));
-    long double sum = 0;
-    long double size = 0;
-    long double cubes = 0;
-    long double fifths = 0;
-    for (std::size_t k = 0; k < w.size(); ++k) {
-      CHECK(w[k] == w[w.size() - 1 - k]);  // to the bit: time-reversible by construction
-      sum += w[k];
-      size += std::abs(w[k]);
-      cubes += w[k] * w[k] * w[k];
-      fifths += std::pow(w[k], 5.0L);
+    const auto stages = traits.stages;
+    long double kicks = traits.lastKick;
+    long double drifts = 0;
+    long double size = std::abs(traits.lastKick);
+    CHECK(traits.lastKick == stages[0].kick);  // to the bit: time-reversible by construction
+    for (std::size_t k = 0; k < stages.size(); ++k) {
+      const std::size_t mirror = stages.size() - 1 - k;
+      CHECK(stages[k].drift == stages[mirror].drift);
+      if (k > 0) {
+        CHECK(stages[k].kick == stages[mirror + 1].kick);
+        CHECK(stages[k].gradient == stages[mirror + 1].gradient);
+      }
+      kicks += stages[k].kick;
+      drifts += stages[k].drift;
+      size += std::abs(stages[k].kick) + std::abs(stages[k].drift);
     }
-    // Each weight is given to half an ulp, or 26 digits; the sum rounds once a term.
-    CHECK(std::abs(sum - 1) <= 4 * size * std::numeric_limits<long double>::epsilon());
-    // Order conditions of symmetric compositions of a second-order method (Hairer, Lubich & Wanner, V.3.1).
-    const long double rounding = 64 * std::numeric_limits<long double>::epsilon();
-    CHECK((std::abs(cubes) <= rounding) == (traits.order >= 4));
-    CHECK((std::abs(fifths) <= rounding) == (traits.order >= 6));
+    // Each number is given to half an ulp, or 26 digits; the sums round once a term.
+    CHECK(std::abs(kicks - 1) <= 4 * size * std::numeric_limits<long double>::epsilon());
+    CHECK(std::abs(drifts - 1) <= 4 * size * std::numeric_limits<long double>::epsilon());
+  }
+}
+
+// Order conditions of symmetric compositions of a second-order method (Hairer, Lubich & Wanner, V.3.1).
+TEST_CASE("The odd power sums of a composition's weights vanish up to its order, and no further") {
+  for (const IntegratorKind kind :
+       {IntegratorKind::VelocityVerlet, IntegratorKind::Yoshida4, IntegratorKind::Yoshida6,
+        IntegratorKind::Yoshida8, IntegratorKind::KahanLi6, IntegratorKind::KahanLi8}) {
+    const IntegratorTraits traits = traitsOf(kind);
+    for (const int power : {3, 5, 7, 9}) {
+      long double sum = 0;
+      long double size = 0;
+      for (const IntegratorStage& stage : traits.stages) {
+        sum += std::pow(stage.drift, static_cast<long double>(power));
+        size += static_cast<long double>(power) * std::pow(std::abs(stage.drift), power);
+      }
+      CAPTURE(traits.name, power, static_cast<double>(sum));
+      CHECK((std::abs(sum) <= 2 * size * std::numeric_limits<long double>::epsilon()) ==
+            (traits.order > power));
+    }
   }
 }
 
@@ -95,7 +117,7 @@ TEST_CASE("Forces are told the part of the step that has passed, and all of it, 
     REQUIRE(passed.size() == static_cast<std::size_t>(traitsOf(kind).forceEvaluations));
     CHECK(passed.back() == h);
     for (std::size_t k = 0; k < passed.size(); ++k) {
-      CHECK_THAT(drifted[k], WithinAbs(passed[k], 1e-16));  // a few roundings of sums below 0.2
+      CHECK_THAT(drifted[k], WithinAbs(passed[k], 5e-16));  // up to 17 roundings of sums below 0.3
     }
   }
 }
@@ -112,7 +134,10 @@ TEST_CASE("The order measured on an eccentric orbit is the order declared") {
   };
   for (const Row& row :
        {Row{IntegratorKind::VelocityVerlet, 2000, 0.02}, Row{IntegratorKind::Yoshida4, 1000, 0.05},
-        Row{IntegratorKind::Yoshida6, 800, 0.1}}) {
+        Row{IntegratorKind::Yoshida6, 800, 0.1}, Row{IntegratorKind::Yoshida8, 400, 0.1},
+        Row{IntegratorKind::BlanesMoan4, 2000, 0.05}, Row{IntegratorKind::BlanesMoan6, 200, 0.05},
+        Row{IntegratorKind::KahanLi6, 400, 0.05}, Row{IntegratorKind::KahanLi8, 160, 0.05},
+        Row{IntegratorKind::ForceGradient4, 500, 0.02}}) {
     const long double slope = std::log2(closureError(row.kind, row.n) / closureError(row.kind, 2 * row.n));
     CAPTURE(traitsOf(row.kind).name, static_cast<double>(slope));
     CHECK_THAT(static_cast<double>(slope), WithinAbs(traitsOf(row.kind).order, row.tolerance));
@@ -121,10 +146,75 @@ TEST_CASE("The order measured on an eccentric orbit is the order declared") {
 
 TEST_CASE("The order measured on an oscillator is the order declared") {
   for (const IntegratorKind kind : kinds) {
-    const int n = kind == IntegratorKind::Yoshida6 ? 100 : 200;
+    const int order = traitsOf(kind).order;
+    const int n = order == 8 ? 64 : order == 6 ? 100 : 200;
     const long double slope = std::log2(oscillatorError(kind, n) / oscillatorError(kind, 2 * n));
     CAPTURE(traitsOf(kind).name, static_cast<double>(slope));
-    CHECK_THAT(static_cast<double>(slope), WithinAbs(traitsOf(kind).order, 0.02));
+    CHECK_THAT(static_cast<double>(slope), WithinAbs(order, order == 8 ? 0.08 : 0.02));
+  }
+}
+
+// What the methods are for: the position error of one orbit at e = 0.5 for an equal number of force
+// evaluations, about 3200 (measured: 1e-8 for Yoshida4, 1.8e-9, 1.1e-11, …).
+TEST_CASE("At equal cost the optimised methods beat Yoshida's by the factors measured") {
+  const auto error = [](IntegratorKind kind) {
+    return closureError(kind, 3200 / traitsOf(kind).forceEvaluations);
+  };
+  CHECK_THAT(static_cast<double>(error(IntegratorKind::Yoshida4) / error(IntegratorKind::ForceGradient4)),
+             WithinRel(92.0, 0.1));
+  CHECK_THAT(static_cast<double>(error(IntegratorKind::ForceGradient4) / error(IntegratorKind::BlanesMoan4)),
+             WithinRel(158.0, 0.1));
+  CHECK_THAT(static_cast<double>(error(IntegratorKind::Yoshida6) / error(IntegratorKind::BlanesMoan6)),
+             WithinRel(181.0, 0.1));
+  CHECK_THAT(static_cast<double>(error(IntegratorKind::Yoshida8) / error(IntegratorKind::KahanLi8)),
+             WithinRel(720.0, 0.1));
+}
+
+/// Two centres at rest: a force without symmetry, so that a kick that is no gradient shows.
+struct TwoCentres {
+  template <class BodiesType>
+  void operator()(BodiesType& bodies) const {
+    using S = typename BodiesType::Scalar;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      const Vector3<S> x = bodies[i].position();
+      const Vector3<S> y = x - Vector3<S>(S(2), S(0), S(0));
+      bodies[i].acceleration() = -x / (x.squaredNorm() * x.norm()) - y / (y.squaredNorm() * y.norm());
+    }
+  }
+};
+
+// The Jacobian J of a symplectic step keeps J^T w J = w, w the symplectic form; here by central differences
+// in long double, in the plane about two centres.
+TEST_CASE("A symplectic step keeps the symplectic form, and what is declared not to be does not") {
+  using Real80 = long double;
+  using State = Eigen::Matrix<Real80, 4, 1>;  // x, y, vx, vy
+  const auto stepped = [](IntegratorKind kind, const State& s) -> State {
+    Bodies<Real80> bodies;
+    Body<Real80> body;
+    body.position = {s[0], s[1], 0};
+    body.velocity = {s[2], s[3], 0};
+    bodies.add(body);
+    run(kind, bodies, 0.4L, 1, TwoCentres{});
+    const Body<Real80> b = bodies[0].load();
+    return State(b.position[0], b.position[1], b.velocity[0], b.velocity[1]);
+  };
+  for (const IntegratorKind kind : kinds) {
+    const State start(1.0L, 0.3L, -0.2L, 0.9L);
+    Eigen::Matrix<Real80, 4, 4> jacobian;
+    const Real80 d = 1e-5L;
+    for (int k = 0; k < 4; ++k) {
+      const State e = State::Unit(k) * d;
+      // Fourth order: the error is d^4 times the fifth derivative, which a step of 0.4 makes some 1e3.
+      jacobian.col(k) = (8 * (stepped(kind, start + e) - stepped(kind, start - e)) -
+                         (stepped(kind, start + 2 * e) - stepped(kind, start - 2 * e))) /
+                        (12 * d);
+    }
+    Eigen::Matrix<Real80, 4, 4> form;
+    form << 0, 0, 1, 0, 0, 0, 0, 1, -1, 0, 0, 0, 0, -1, 0, 0;
+    const Real80 error = (jacobian.transpose() * form * jacobian - form).norm();
+    CAPTURE(traitsOf(kind).name, static_cast<double>(error));
+    CHECK((error < 1e-11L) == traitsOf(kind).symplectic);
+    CHECK(error < 1e-3L);
   }
 }
 

@@ -1,91 +1,34 @@
 #pragma once
 
 /// \file
-/// Symplectic integrators as tables for one kick-drift-kick loop.
-///
-/// A method is a palindrome of stage weights w_1 … w_s with sum 1. Stage k is velocity Verlet over w_k h:
-///   v += a w_k h/2;  x += v w_k h;  a = a(x);  v += a w_k h/2
-/// and the kicks of neighbouring stages, which use the same a, are taken as one. So a step costs s force
-/// evaluations, and ends with x, v and a at the same time. Every such method is symplectic and
-/// time-reversible for a fixed step.
+/// The loop of kicks, drifts and force evaluations, for every method that is a row of a table.
 
-#include <gravel/bodies/bodies.hpp>
 #include <gravel/core/parallel.hpp>
-
-#include <array>
-#include <span>
+#include <gravel/dynamics/compensation.hpp>
+#include <gravel/dynamics/integrator_tables.hpp>
+#include <gravel/dynamics/rotation.hpp>
 
 namespace gravel {
-
-enum class IntegratorKind : std::uint8_t {
-  VelocityVerlet,  ///< order 2, 1 force evaluation a step (Verlet 1967; Swope et al. 1982)
-  Yoshida4,        ///< order 4, 3 evaluations (Yoshida 1990, Phys. Lett. A 150, 262; Forest & Ruth 1990)
-  Yoshida6,        ///< order 6, 7 evaluations (Yoshida 1990, solution A; digits of Hairer, Lubich & Wanner)
-};
-
-/// What a method is; tests measure each figure.
-struct IntegratorTraits {
-  const char* name;
-  int order;
-  int forceEvaluations;  ///< per step
-  std::span<const long double> weights;
-};
-
-namespace detail {
-inline constexpr std::array<long double, 1> verletWeights{1.0L};
-// w = 1/(2 - 2^(1/3)), 1 - 2w, w
-inline constexpr std::array<long double, 3> yoshida4Weights{1.351207191959657634047687808971460827L,
-                                                            -1.702414383919315268095375617942921653L,
-                                                            1.351207191959657634047687808971460827L};
-// Hairer, Lubich & Wanner, Geometric Numerical Integration, 2nd ed., eq. V.3.11
-inline constexpr std::array<long double, 7> yoshida6Weights{
-    0.78451361047755726381949763L, 0.23557321335935813368479318L,  -1.17767998417887100694641568L,
-    1.31518632068391121888424973L, -1.17767998417887100694641568L, 0.23557321335935813368479318L,
-    0.78451361047755726381949763L};
-}  // namespace detail
-
-constexpr IntegratorTraits traitsOf(IntegratorKind kind) {
-  switch (kind) {
-    case IntegratorKind::Yoshida4:
-      return {"Yoshida4", 4, 3, detail::yoshida4Weights};
-    case IntegratorKind::Yoshida6:
-      return {"Yoshida6", 6, 7, detail::yoshida6Weights};
-    case IntegratorKind::VelocityVerlet:
-      break;
-  }
-  return {"VelocityVerlet", 2, 1, detail::verletWeights};
-}
-
-/// Turns q by the rotation vector w h: the exponential map, exact for a constant w. Normalised again.
-template <Real Scalar>
-Quaternion<Scalar> rotated(const Quaternion<Scalar>& q, const Vector3<Scalar>& w, const Scalar& h) {
-  using std::cos;
-  using std::sin;
-  using std::sqrt;
-  const Scalar half = Scalar(1) / Scalar(2);
-  const Vector3<Scalar> half_turn = w * (half * h);
-  const Scalar angle_sq = half_turn.squaredNorm();
-  const Scalar angle = sqrt(angle_sq);
-  // sin(x)/x; below 1e-4 its series to x^4 is exact to 1e-26
-  const Scalar sinc = angle > Scalar(1e-4)
-                          ? Scalar(sin(angle) / angle)
-                          : Scalar(1) - angle_sq / Scalar(6) * (Scalar(1) - angle_sq / Scalar(20));
-  Quaternion<Scalar> turn;
-  turn.w() = cos(angle);
-  turn.vec() = half_turn * sinc;
-  Quaternion<Scalar> next = turn * q;
-  next.normalize();
-  return next;
-}
 
 namespace detail {
 
 constexpr std::size_t bodyGrain = 2048;
 
+/// A number of a table in the scalar's own precision.
+template <Real Scalar>
+Scalar fromTable(long double x) {
+  if constexpr (std::is_floating_point_v<Scalar> || !std::constructible_from<Scalar, long double>) {
+    return Scalar(static_cast<std::conditional_t<std::is_floating_point_v<Scalar>, Scalar, double>>(x));
+  } else {
+    return Scalar(x);
+  }
+}
+
 /// v += a kick; then x += v drift, and the orientation with it. One pass; fixed bodies stay.
 /// `torques` tells whether any angular acceleration can differ from zero.
 template <Real Scalar, class Layout>
-void kickAndDrift(Bodies<Scalar, Layout>& bodies, const Scalar& kick, const Scalar& drift, bool torques) {
+void kickAndDrift(Bodies<Scalar, Layout>& bodies, const Scalar& kick, const Scalar& drift, bool torques,
+                  Compensation<Scalar>* lost) {
   parallelFor(bodies.size(), bodyGrain, [&](std::size_t i) {
     const auto body = bodies[i];
     if (body.isFixed()) {
@@ -94,19 +37,42 @@ void kickAndDrift(Bodies<Scalar, Layout>& bodies, const Scalar& kick, const Scal
     auto&& v = body.velocity();
     auto&& w = body.angularVelocity();
     if (!(kick == Scalar(0))) {
-      v += body.acceleration() * kick;
+      if (lost != nullptr) {
+        (*lost)[i].velocity.add(v, body.acceleration() * kick);
+      } else {
+        v += body.acceleration() * kick;
+      }
       if (torques) {
         w += body.angularAcceleration() * kick;
       }
     }
     if (!(drift == Scalar(0))) {
-      body.position() += v * drift;
+      if (lost != nullptr) {
+        (*lost)[i].position.add(body.position(), v * drift);
+      } else {
+        body.position() += v * drift;
+      }
       const Vector3<Scalar> spin = w;
       if (!(spin.squaredNorm() == Scalar(0))) {
         body.orientation() = rotated(Quaternion<Scalar>(body.orientation()), spin, drift);
       }
     }
   });
+}
+
+/// The forces at x + shift a(x) in place of those at x. Positions are what they were afterwards, to the bit.
+template <Real Scalar, class Layout, class Forces>
+void extrapolateForces(Bodies<Scalar, Layout>& bodies, const Scalar& shift, Forces&& forces) {
+  std::vector<Vector3<Scalar>> places(bodies.size());
+  parallelFor(bodies.size(), bodyGrain, [&](std::size_t i) {
+    const auto body = bodies[i];
+    places[i] = body.position();
+    if (!body.isFixed()) {
+      body.position() += body.acceleration() * shift;
+    }
+  });
+  forces();
+  parallelFor(bodies.size(), bodyGrain, [&](std::size_t i) { bodies[i].position() = places[i]; });
 }
 
 }  // namespace detail
@@ -119,34 +85,50 @@ struct NoDeparture {
 };
 
 /// Advances all bodies by one step h. Accelerations must be those of the present positions, and are at the
-/// end. \param forces  called s times with the part of h that has passed [s]: accelerations at the present
-/// positions \param arrival called once, when positions are final and the last forces are not yet evaluated
-/// Cost: s force evaluations, s + 1 passes over the bodies. Bits do not depend on the number of threads.
+/// end.
+/// \param kind  one whose traits have stages
+/// \param forces  called with the part of h that has passed [s]: accelerations at the present positions; as
+///   often as the traits' forceEvaluations say
+/// \param arrival  called once, when positions are final and the last forces are not yet evaluated
+/// \param lost  carries what sums lose to rounding from step to step; nullptr: nothing is carried
+/// Cost: the force evaluations and, for s stages, s + 1 passes over the bodies. Bits do not depend on the
+/// number of threads.
 template <Real Scalar, class Layout, class Forces, class Arrival, class Departure = NoDeparture>
 void integrate(IntegratorKind kind, Bodies<Scalar, Layout>& bodies, const Scalar& h, bool torques,
-               Forces&& forces, Arrival&& arrival, Departure&& departure = {}) {
-  const std::span<const long double> weights = traitsOf(kind).weights;
-  const Scalar half_h = h / Scalar(2);
-  Scalar pending(0);
+               Forces&& forces, Arrival&& arrival, Departure&& departure = {},
+               Compensation<Scalar>* lost = nullptr) {
+  const IntegratorTraits method = traitsOf(kind);
+  if (!Compensation<Scalar>::carries) {
+    lost = nullptr;
+  }
+  if (lost != nullptr) {
+    lost->resize(bodies.size());
+  }
+  const std::size_t stages = method.stages.size();
   Scalar passed(0);
-  for (std::size_t k = 0; k < weights.size(); ++k) {
-    const Scalar w = Scalar(weights[k]);
-    const Scalar kick = pending + w * half_h;
-    if (k == 0 && departure) {
-      detail::kickAndDrift(bodies, kick, Scalar(0), torques);
-      departure(kick);
-      detail::kickAndDrift(bodies, Scalar(0), Scalar(w * h), torques);
-    } else {
-      detail::kickAndDrift(bodies, kick, Scalar(w * h), torques);
+  for (std::size_t k = 0; k < stages; ++k) {
+    const IntegratorStage& stage = method.stages[k];
+    const Scalar kick = detail::fromTable<Scalar>(stage.kick) * h;
+    const Scalar drift = detail::fromTable<Scalar>(stage.drift) * h;
+    if (stage.gradient != 0) {
+      const Scalar shift = detail::fromTable<Scalar>(stage.gradient) * h * h;
+      detail::extrapolateForces(bodies, shift, [&] { forces(passed); });
     }
-    if (k + 1 == weights.size()) {
+    if (k == 0 && departure) {
+      detail::kickAndDrift(bodies, kick, Scalar(0), torques, lost);
+      departure(kick);
+      detail::kickAndDrift(bodies, Scalar(0), drift, torques, lost);
+    } else {
+      detail::kickAndDrift(bodies, kick, drift, torques, lost);
+    }
+    if (k + 1 == stages) {
       arrival();
     }
-    passed += w * h;
-    forces(k + 1 == weights.size() ? h : passed);
-    pending = w * half_h;
+    passed += drift;
+    forces(k + 1 == stages ? h : passed);
   }
-  detail::kickAndDrift(bodies, pending, Scalar(0), torques);
+  detail::kickAndDrift(bodies, Scalar(detail::fromTable<Scalar>(method.lastKick) * h), Scalar(0), torques,
+                       lost);
 }
 
 }  // namespace gravel

@@ -30,7 +30,8 @@ struct SimulationConfig {
   Scalar minTimeStep = Scalar(0);        ///< [s] adaptive steps are not shorter; at most timeStep
   Scalar timeStepFactor = Scalar(0.02);  ///< adaptive step over the time in which motion changes
   IntegratorKind integrator = IntegratorKind::VelocityVerlet;
-  Scalar epsilon = Scalar(1e-12);            ///< lengths [m] and speeds [m s^-1] below it count as zero
+  bool compensatedSummation = true;  ///< under mutual gravity, carry what kicks and drifts lose to rounding
+  Scalar epsilon = Scalar(1e-12);    ///< lengths [m] and speeds [m s^-1] below it count as zero
   Scalar coeffRestitution = Scalar(0.5);     ///< approach speed kept in a hit; 1 keeps all
   Scalar restitutionExponent = Scalar(0);    ///< that falls with impact speed as v^-exponent; 0: it does not
   Scalar restitutionSpeed = Scalar(1);       ///< [m s^-1] from this speed on
@@ -66,7 +67,9 @@ template <class Enum>
 struct EnumNames;
 template <>
 struct EnumNames<IntegratorKind> {
-  static constexpr std::array<std::string_view, 3> values{"VelocityVerlet", "Yoshida4", "Yoshida6"};
+  static constexpr std::array<std::string_view, 9> values{"VelocityVerlet", "Yoshida4",    "Yoshida6",
+                                                          "Yoshida8",       "BlanesMoan4", "BlanesMoan6",
+                                                          "KahanLi6",       "KahanLi8",    "ForceGradient4"};
 };
 template <>
 struct EnumNames<GravityKind> {
@@ -101,6 +104,7 @@ void forEachSetting(Config& c, Visitor&& visit) {
   visit(S{"minTimeStep", "s", any}, c.minTimeStep);
   visit(S{"timeStepFactor", "1", tolerance}, c.timeStepFactor);
   visit(S{"integrator", "", any}, c.integrator);
+  visit(S{"compensatedSummation", "", any}, c.compensatedSummation);
   visit(S{"epsilon", "m, m s^-1", any}, c.epsilon);
   visit(S{"coeffRestitution", "1", unit}, c.coeffRestitution);
   visit(S{"restitutionExponent", "1", unit}, c.restitutionExponent);

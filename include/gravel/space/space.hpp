@@ -217,6 +217,8 @@ class Space : public Settings<Scalar> {
   Scalar lastTotalEnergy_ = std::numeric_limits<double>::infinity();
   Scalar hookPower_ = Scalar(0);
 
+  Compensation<Scalar> lost_;  // what kicks and drifts lost to rounding
+
   // Positions and masses at the last force evaluation: forces are renewed if somebody changed them.
   std::vector<Eigen::Array<Scalar, 4, 1>> places_;
   bool forcesValid_ = false;

@@ -165,6 +165,8 @@ void Space<Scalar, Layout>::save(const std::string& path) const {
   numbers.forEach([&](const char* name, const auto& value) { out.value(name, value); });
   contact_.save(out);
   saveBodies(bodies_, out);
+  const std::vector<Scalar> lost = lost_.lostParts(bodies_);
+  out.array("lost parts", lost.data(), lost.size());
   out.write(path);
 }
 
@@ -183,9 +185,11 @@ void Space<Scalar, Layout>::restore(const std::string& path) {
   contact.load(in);
   gravel::Bodies<Scalar, SoA> bodies = loadBodies<Scalar>(in);
   bodies.skipIds(BodyId{numbers.nextId});
+  const std::vector<Scalar> lost = in.array<Scalar>("lost parts");
 
   // Nothing throws from here on but for want of memory.
   bodies_.assign(bodies);
+  lost_.setLostParts(bodies_, lost);
   this->config_ = config;
   contact_ = std::move(contact);
   force_.gravity.setKind(config.gravity);

@@ -80,7 +80,10 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration) {
     };
     {
       const Profiler::Scope scope(profiler_, Phase::Integration);
-      integrate(this->config_.integrator, bodies_, h, force_.hasTorques(), forces, arrival, departure);
+      // Without mutual gravity runs are not long orbits, and nothing is carried.
+      const bool carry = this->config_.compensatedSummation && !(getG() == Scalar(0));
+      integrate(this->config_.integrator, bodies_, h, force_.hasTorques(), forces, arrival, departure,
+                carry ? &lost_ : nullptr);
     }
     rememberPlaces();
     left_.correction += contact_.separationWork(force_, bodies_);
