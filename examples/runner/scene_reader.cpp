@@ -266,15 +266,25 @@ void readBox(TableReader& reader, const SimulationConfig<double>& config, std::v
 }
 
 void readDomain(TableReader& reader, Domain<double>& domain) {
-  static const std::vector<std::string> kinds{"open", "periodic"};
+  static const std::vector<std::string> kinds{"open", "periodic", "shearPeriodic"};
   std::size_t kind = 0;
   Vector3<double> lengths = Vector3<double>::Zero();
   reader.choice("kind", kinds, kind);
   const bool hasLengths = reader.numbers<3>("lengths", lengths, positive());
+  double omega = 0.0;
+  const bool hasOmega = reader.real("omega", omega);
+  double vertical = omega;
+  reader.real("verticalFrequency", vertical);
+  if (kind != 0 && !reader.has("lengths")) {
+    reader.missing("\"lengths\", the box's three sides");
+  }
+  if (kind == 2 && !reader.has("omega")) {
+    reader.missing("\"omega\", the orbital frequency");
+  }
   if (kind == 1 && hasLengths) {
     domain = Domain<double>::periodic(lengths);
-  } else if (kind == 1 && !reader.has("lengths")) {
-    reader.missing("\"lengths\", the box's three sides");
+  } else if (kind == 2 && hasLengths && hasOmega) {
+    domain = Domain<double>::shearPeriodic(lengths, omega, vertical);
   }
 }
 

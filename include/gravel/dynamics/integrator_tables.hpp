@@ -29,6 +29,9 @@ enum class IntegratorKind : std::uint8_t {
   KahanLi6,        ///< order 6, 9 evaluations (Kahan & Li 1997, Math. Comput. 66, 1089, s9odr6a)
   KahanLi8,        ///< order 8, 17 evaluations (Kahan & Li 1997, s17odr8a)
   ForceGradient4,  ///< order 4, 3 evaluations (Chin 1997, Phys. Lett. A 226, 344, scheme A)
+  /// order 2, 1 evaluation, in the frame of a shear-periodic domain (dynamics/epicycle.hpp); in others
+  /// velocity Verlet
+  SymplecticEpicycle,
 };
 
 /// One kick, one drift and the force evaluation after it.
@@ -159,6 +162,8 @@ inline constexpr IntegratorTraits traitsOf(IntegratorKind kind) {
       return row("KahanLi8", 8, detail::kahanLi8Stages);
     case IntegratorKind::ForceGradient4:
       return row("ForceGradient4", 4, detail::forceGradient4Stages, false);
+    case IntegratorKind::SymplecticEpicycle:
+      return row("SymplecticEpicycle", 2, detail::verletStages);
     case IntegratorKind::VelocityVerlet:
       break;
   }

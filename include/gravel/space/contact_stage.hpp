@@ -8,6 +8,7 @@
 #include <gravel/contact/narrow_phase.hpp>
 #include <gravel/core/profiler.hpp>
 #include <gravel/dynamics/boundary.hpp>
+#include <gravel/dynamics/epicycle.hpp>
 #include <gravel/output/snapshot.hpp>
 #include <gravel/space/force_stage.hpp>
 #include <gravel/space/material_table.hpp>
@@ -29,17 +30,32 @@ class ContactStage {
   const std::vector<Contact<Scalar>>& contacts() const { return contacts_; }
   const ContactReport<Scalar>& report() const { return report_; }
 
-  /// Brings bodies that left a periodic box back in through the other side.
-  void wrap(Bodies& bodies, const Scalar& time) const {
+  /// Brings bodies that left a periodic box back in through the other side. \return the energy that they have
+  /// more there [J]: what the shear of a disc puts in
+  Scalar wrap(Bodies& bodies, const Scalar& time) const {
     if (domain.isOpen()) {
-      return;
+      return Scalar(0);
     }
-    parallelFor(bodies.size(), detail::bodyGrain, [&](std::size_t i) {
-      Vector3<Scalar> x = bodies[i].position();
-      Vector3<Scalar> v = bodies[i].velocity();
-      domain.wrap(x, v, time);
-      bodies[i].position() = x;
-      bodies[i].velocity() = v;
+    const HillFrame<Scalar> frame(domain);
+    return orderedSum(bodies.size(), detail::bodyGrain, Scalar(0), [&](std::size_t begin, std::size_t end) {
+      Scalar gained(0);
+      for (std::size_t i = begin; i < end; ++i) {
+        const Vector3<Scalar> x0 = bodies[i].position();
+        const Vector3<Scalar> v0 = bodies[i].velocity();
+        Vector3<Scalar> x = x0;
+        Vector3<Scalar> v = v0;
+        domain.wrap(x, v, time);
+        if (x == x0) {
+          continue;
+        }
+        bodies[i].position() = x;
+        bodies[i].velocity() = v;
+        if (frame.turns()) {
+          gained += Scalar(bodies[i].mass()) * (Vector3<Scalar>(v - v0).dot(v + v0) / Scalar(2) +
+                                                (frame.potential(x) - frame.potential(x0)));
+        }
+      }
+      return gained;
     });
   }
 
@@ -120,8 +136,13 @@ class ContactStage {
   Scalar separationWork(const ForceStage<Scalar, Layout>& force, const Bodies& bodies) const {
     Scalar work(0);
     if (moved_) {
+      const HillFrame<Scalar> frame(domain);
       for (const Displacement<Scalar>& d : solver_.displacements()) {
         work += force.conservativeForce(bodies, d.body).dot(d.shift);
+        if (frame.turns()) {
+          const Vector3<Scalar> x = bodies[d.body].position();
+          work += Scalar(bodies[d.body].mass()) * (frame.potential(x - d.shift) - frame.potential(x));
+        }
       }
     }
     return work;

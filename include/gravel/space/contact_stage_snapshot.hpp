@@ -11,6 +11,8 @@ template <Real Scalar, class Layout>
 void ContactStage<Scalar, Layout>::save(SnapshotWriter& out) const {
   out.value("domain", static_cast<std::uint32_t>(domain.kind()));
   out.array("domain lengths", domain.lengths().data(), 3);
+  out.value("domain omega", domain.omega());
+  out.value("domain vertical frequency", domain.verticalFrequency());
   std::vector<Scalar> numbers;
   std::vector<std::uint32_t> surfaces;
   std::vector<std::uint64_t> planeNumbers;
@@ -53,11 +55,15 @@ template <Real Scalar, class Layout>
 void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
   const auto kind = in.value<std::uint32_t>("domain");
   const std::vector<Scalar> lengths = in.array<Scalar>("domain lengths");
-  if (lengths.size() != 3 || kind > static_cast<std::uint32_t>(DomainKind::Periodic)) {
-    in.fail("holds a domain that is neither open nor periodic");
+  const auto omega = in.value<Scalar>("domain omega");
+  const auto vertical = in.value<Scalar>("domain vertical frequency");
+  if (lengths.size() != 3 || kind > static_cast<std::uint32_t>(DomainKind::ShearPeriodic)) {
+    in.fail("holds a domain of an unknown kind");
   }
   if (static_cast<DomainKind>(kind) == DomainKind::Periodic) {
     domain = Domain<Scalar>::periodic({lengths[0], lengths[1], lengths[2]});
+  } else if (static_cast<DomainKind>(kind) == DomainKind::ShearPeriodic) {
+    domain = Domain<Scalar>::shearPeriodic({lengths[0], lengths[1], lengths[2]}, omega, vertical);
   }
   const std::vector<Scalar> sides = in.array<Scalar>("planes");
   const auto surfaces = in.array<std::uint32_t>("materials of planes");

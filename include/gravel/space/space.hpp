@@ -92,8 +92,11 @@ class Space : public Settings<Scalar> {
   const Vector& uniformField() const { return force_.field; }
   /// The user's own force; an empty one takes it away again.
   void setForceHook(ForceHook<Scalar, Layout> hook);
-  /// Open or periodic. \throws std::invalid_argument for a periodic domain with gravity (G > 0), and for a
-  /// shear-periodic one, whose equations of motion no integrator here has; the components take both
+  /// Open, periodic or shear-periodic. A shear-periodic one is a patch of a disc in Hill's frame: positions,
+  /// velocities and spins are those in the frame, its potential is part of the potential energy, and the
+  /// shear does its `work` where bodies or contacts cross an edge in x. \throws std::invalid_argument for a
+  /// domain that is not open with gravity (G > 0), and for a shear-periodic one unless config.integrator is
+  /// SymplecticEpicycle
   void setDomain(const Domain<Scalar>& domain);
   const Domain<Scalar>& domain() const { return contact_.domain; }
 

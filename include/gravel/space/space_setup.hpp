@@ -124,8 +124,11 @@ void Space<Scalar, Layout>::setForceHook(ForceHook<Scalar, Layout> hook) {
 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::checkGravityInDomain(const Scalar& G, const Domain<Scalar>& domain) const {
-  if (domain.kind() == DomainKind::ShearPeriodic) {
-    detail::refuse("domain of a Space", "shear-periodic", "open or periodic");
+  if (domain.kind() == DomainKind::ShearPeriodic &&
+      this->config_.integrator != IntegratorKind::SymplecticEpicycle) {
+    detail::refuse("domain", "shear-periodic",
+                   std::string("open or periodic with the integrator ") +
+                       traitsOf(this->config_.integrator).name + "; shear-periodic with SymplecticEpicycle");
   }
   if (!domain.isOpen() && !(G == Scalar(0))) {
     detail::refuse("G in a periodic domain", detail::formatReal(G),
@@ -136,7 +139,11 @@ void Space<Scalar, Layout>::checkGravityInDomain(const Scalar& G, const Domain<S
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::setDomain(const Domain<Scalar>& domain) {
   checkGravityInDomain(getG(), domain);
-  contact_.domain = domain;
+  if (HillFrame<Scalar>(domain).turns() || HillFrame<Scalar>(contact_.domain).turns()) {
+    changePotential([&] { contact_.domain = domain; });
+  } else {
+    contact_.domain = domain;
+  }
 }
 
 template <Real Scalar, class Layout>
@@ -176,7 +183,7 @@ Scalar Space<Scalar, Layout>::bindingEnergy(std::size_t i) const {
                    one.inertia() * Scalar(one.angularVelocity().squaredNorm())) /
                   Scalar(2);
   if (!one.isFixed()) {
-    energy -= m * force_.field.dot(x);
+    energy += m * (HillFrame<Scalar>(contact_.domain).potential(x) - force_.field.dot(x));
   }
   if (!(getG() == Scalar(0)) && m > Scalar(0)) {
     for (std::size_t j = 0; j < n(); ++j) {

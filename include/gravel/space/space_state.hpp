@@ -11,7 +11,9 @@ namespace gravel {
 
 template <Real Scalar, class Layout>
 Scalar Space<Scalar, Layout>::potentialEnergy() const {
-  return force_.potentialEnergy(bodies_, getG(), this->config_.softening);
+  const HillFrame<Scalar> frame(contact_.domain);
+  return force_.potentialEnergy(bodies_, getG(), this->config_.softening) +
+         (frame.turns() ? frameEnergy(bodies_, frame) : Scalar(0));
 }
 
 template <Real Scalar, class Layout>

@@ -17,6 +17,7 @@
 /// rolling and sliding are of second order in h, and a body at rest has velocity zero. A single solve at the
 /// end of the step lets piles sink by g h^2/2 and be lifted again every step, which spins a rolling pile up.
 
+#include <gravel/dynamics/epicycle.hpp>
 #include <gravel/space/space.hpp>
 
 namespace gravel {
@@ -74,16 +75,21 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration) {
     const Departure departure{this};
     const auto arrival = [&] {
       contact_.boundaries.advance(h);
-      contact_.wrap(bodies_, Scalar(time_ + h));
+      left_.work -= contact_.wrap(bodies_, Scalar(time_ + h));
       contact_.detect(bodies_, this->config_, Scalar(time_ + h), h, profiler_);
       contact_.separate(bodies_, this->config_, Scalar(time_ + h), profiler_);
     };
     {
       const Profiler::Scope scope(profiler_, Phase::Integration);
-      // Without mutual gravity runs are not long orbits, and nothing is carried.
-      const bool carry = this->config_.compensatedSummation && !(getG() == Scalar(0));
-      integrate(this->config_.integrator, bodies_, h, force_.hasTorques(), forces, arrival, departure,
-                carry ? &lost_ : nullptr);
+      const HillFrame<Scalar> frame(contact_.domain);
+      if (frame.turns()) {
+        integrateEpicycle(frame, bodies_, h, force_.hasTorques(), forces, arrival, departure);
+      } else {
+        // Without mutual gravity runs are not long orbits, and nothing is carried.
+        const bool carry = this->config_.compensatedSummation && !(getG() == Scalar(0));
+        integrate(this->config_.integrator, bodies_, h, force_.hasTorques(), forces, arrival, departure,
+                  carry ? &lost_ : nullptr);
+      }
     }
     rememberPlaces();
     left_.correction += contact_.separationWork(force_, bodies_);

@@ -53,13 +53,25 @@ class Domain {
 
   /// \param omega orbital frequency [s^-1], finite, of either sign. \throws std::invalid_argument otherwise
   static Domain shearPeriodic(const Vector3<S>& lengths, S omega) {
-    return Domain(DomainKind::ShearPeriodic, lengths, omega);
+    return shearPeriodic(lengths, omega, omega);
+  }
+  /// \param vertical frequency [s^-1] of the motion normal to the orbit, finite: above omega for a disc whose
+  ///        own gravity pulls to its plane, 0 for none
+  static Domain shearPeriodic(const Vector3<S>& lengths, S omega, S vertical) {
+    Domain domain(DomainKind::ShearPeriodic, lengths, omega);
+    if (!isFinite(vertical)) {
+      detail::refuse("vertical frequency of the domain", detail::formatReal(vertical), "finite");
+    }
+    domain.vertical_ = vertical;
+    return domain;
   }
 
   DomainKind kind() const { return kind_; }
   bool isOpen() const { return kind_ == DomainKind::Open; }
   const Vector3<S>& lengths() const { return lengths_; }
   S omega() const { return omega_; }
+  /// Frequency [s^-1] of the motion normal to the orbit; 0 unless shear-periodic.
+  S verticalFrequency() const { return vertical_; }
 
   /// Speed [m s^-1] by which the image one box further out in x lags in y; 0 unless shear-periodic.
   S shearSpeed() const { return S(1.5) * omega_ * lengths_[0]; }
@@ -103,7 +115,7 @@ class Domain {
 
   friend bool operator==(const Domain& a, const Domain& b) {
     return a.kind_ == b.kind_ && a.lengths_[0] == b.lengths_[0] && a.lengths_[1] == b.lengths_[1] &&
-           a.lengths_[2] == b.lengths_[2] && a.omega_ == b.omega_;
+           a.lengths_[2] == b.lengths_[2] && a.omega_ == b.omega_ && a.vertical_ == b.vertical_;
   }
 
  private:
@@ -171,6 +183,7 @@ class Domain {
   DomainKind kind_ = DomainKind::Open;
   Vector3<S> lengths_ = Vector3<S>::Zero();
   S omega_ = S(0);
+  S vertical_ = S(0);
 };
 
 }  // namespace gravel

@@ -1,0 +1,243 @@
+#include "laws/laws.hpp"
+#include "support/catch.hpp"
+#include "support/temporary_file.hpp"
+#include <gravel/core/random.hpp>
+
+// A patch of a disc in Hill's frame: shear-periodic, moved by the symplectic epicycle integrator.
+
+using namespace gravel;
+using namespace gravel::test;
+
+namespace {
+
+const double omega = 1.0;
+const Vec box(12, 14, 16);
+
+SimulationConfig<double> patchConfig(double dt) {
+  SimulationConfig<double> config = plain(dt);
+  config.integrator = IntegratorKind::SymplecticEpicycle;
+  config.coeffRestitution = 0.5;
+  return config;
+}
+
+Space<double> patch(double dt, double friction = 0.0) {
+  SimulationConfig<double> config = patchConfig(dt);
+  config.coeffFriction = config.coeffStaticFriction = friction;
+  Space<double> space(config);
+  space.setDomain(Domain<double>::shearPeriodic(box, omega));
+  return space;
+}
+
+/// The velocity of the flow at x.
+Vec flow(const Vec& x) { return {0, -1.5 * omega * x[0], 0}; }
+
+/// n balls in the flow, with random velocities besides; none overlap at the start.
+void fill(Space<double>& space, std::uint64_t n, double speed) {
+  const CounterRandom random(9);
+  for (std::uint64_t i = 0; i < n; ++i) {
+    const Vec x(2.9 * double(i % 4) - 4.4, 2.7 * double(i / 4 % 5) - 5.5, 2.5 * double(i / 20) - 2.4);
+    space.addBody(ball(x, flow(x) + speed * random.direction(i), 1.0, 1.0 + double(i % 3),
+                       0.5 * random.direction(i + 1000)));
+  }
+}
+
+/// Guiding centres, (4 x + 2 v_y/Omega), and the momentum m (v_y + 2 Omega x) that goes with them.
+double momentumAlong(const Space<double>& space) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < space.n(); ++i) {
+    const auto body = space.body(i);
+    sum += body.mass() * (body.velocity()[1] + 2 * omega * body.position()[0]);
+  }
+  return sum;
+}
+
+}  // namespace
+
+TEST_CASE("A shear-periodic domain needs the integrator of its frame, and is refused with any other") {
+  Space<double> other(plain(1e-3));
+  CHECK_THROWS_WITH(other.setDomain(Domain<double>::shearPeriodic(box, omega)),
+                    ContainsSubstring("shear-periodic") && ContainsSubstring("VelocityVerlet") &&
+                        ContainsSubstring("SymplecticEpicycle"));
+  CHECK(other.domain().isOpen());
+  Space<double> space = patch(1e-3);
+  CHECK_THROWS_WITH(space.setG(1.0), ContainsSubstring("periodic"));
+  CHECK_THROWS_WITH(Domain<double>::shearPeriodic(box, omega, HUGE_VAL),
+                    ContainsSubstring("vertical frequency") && ContainsSubstring("inf"));
+}
+
+TEST_CASE("In an open domain the epicycle integrator is velocity Verlet, to the bit") {
+  const auto run = [](IntegratorKind kind) {
+    SimulationConfig<double> config = plain(1e-2);
+    config.integrator = kind;
+    Space<double> space(config);
+    space.setUniformField({0, 0, -1});
+    space.addPlane({0, 0, 1}, -6);
+    fill(space, 40, 1.0);
+    advance(space, 200);
+    return stateOf(space);
+  };
+  CHECK(sameBits(run(IntegratorKind::VelocityVerlet), run(IntegratorKind::SymplecticEpicycle)));
+}
+
+TEST_CASE("A lone body follows its epicycle across the sheared edges, and its energy is booked") {
+  Space<double> space = patch(0.01);
+  const Vec x0(5, 1, 2), v0(0.8, -6.9, 0.4);
+  space.addBody(ball(x0, v0, 0.1, 2.0));
+  const double before = space.energyLedger().total();
+  advance(space, 2000);
+  const double t = space.time();
+  const double centre = 4 * x0[0] + 2 * v0[1];
+  const double amplitude = 3 * x0[0] + 2 * v0[1];
+  const Vec x(centre - amplitude * std::cos(t) + v0[0] * std::sin(t),
+              x0[1] - 2 * v0[0] + 2 * amplitude * std::sin(t) + 2 * v0[0] * std::cos(t) - 1.5 * centre * t,
+              x0[2] * std::cos(t) + v0[2] * std::sin(t));
+  // The same place up to the boxes that it was brought back by.
+  const Vec r = space.domain().minimumImage(Vec(space.body(0).position() - x), t);
+  CHECK(r.norm() < 1e-10);
+  CHECK(space.body(0).position().cwiseAbs().maxCoeff() <= 8.0);
+  CHECK(std::abs(space.energyLedger().work) > 1.0);  // x swings by 1.6 about 6.2: it crossed the edge
+  CHECK_THAT(space.energyLedger().total(), WithinAbs(before, 1e-11));
+}
+
+// Every body gains or loses an image: all of it is the same patch.
+TEST_CASE("Bodies seen as other images of themselves move alike") {
+  const auto run = [](bool images) {
+    Space<double> space = patch(0.01, 0.4);
+    fill(space, 60, 1.5);
+    for (std::size_t i = 0; images && i < space.n(); ++i) {
+      const double k = double(i % 3) - 1.0;
+      space.body(i).position() += Vec(k * box[0], double(i % 2) * box[1], 0);
+      space.body(i).velocity()[1] -= k * space.domain().shearSpeed();
+    }
+    advance(space, 150);
+    return space;
+  };
+  const Space<double> one = run(false);
+  const Space<double> two = run(true);
+  CHECK(one.energyLedger().restitution > 1.0);
+  double worst = 0.0;
+  for (std::size_t i = 0; i < one.n(); ++i) {
+    Vec r = one.body(i).position() - two.body(i).position();
+    Vec v = one.body(i).velocity() - two.body(i).velocity();
+    one.domain().minimumImage(r, v, one.time());
+    worst = std::max({worst, r.norm(), v.norm()});
+  }
+  // 1e-15 of rounding, grown by the few collisions each body had.
+  CHECK(worst < 1e-9);
+}
+
+TEST_CASE("A blow across the sheared edge obeys restitution and keeps momentum as images see it") {
+  for (const double friction : {0.0, 0.5}) {
+    Space<double> space = patch(1e-3, friction);
+    const double m1 = 2.0, m2 = 3.0;
+    const Vec u(0.7, 0.2, -0.1);  // relative velocity, of what the second meets
+    const BodyId right = space.addBody(ball({5.5, 0, 0}, {0, 0, 0}, 1.0, m1));
+    // The image of the left one that lies beyond the right edge: at time 0 it is not sheared yet.
+    const BodyId left = space.addBody(ball({-4.52, 0.3, 0}, {0, 0, 0}, 1.0, m2));
+    space.body(right).velocity() = flow({5.5, 0, 0}) + u;
+    space.body(left).velocity() = flow({-4.52, 0.3, 0});
+    const Vec drift(0, -space.domain().shearSpeed(), 0);
+    std::size_t hits = 0;
+    for (std::size_t i = 0; i < 60; ++i) {
+      space.computeDynamics(i);
+      if (space.contactCount() > 0) {
+        const Contact<double> c = space.contacts()[0];
+        const ContactImpulse<double> j = space.contactImpulses()[0];
+        hits += j.normal > 0 ? 1 : 0;
+        CHECK(c.key1 == toInteger(right));
+        CHECK_THAT(c.drift[1], WithinRel(drift[1], 1e-15));
+        if (j.normal > 0) {
+          // After the blow at the end of this step: before it, the relative velocity was larger by J (1/m1 +
+          // 1/m2).
+          const Vec after = space.body(left).velocity() + c.drift - space.body(right).velocity();
+          const Vec before = after - (j.normal * c.normal + j.tangential) * (1 / m1 + 1 / m2);
+          CHECK(before.dot(c.normal) < 0);
+          CHECK_THAT(after.dot(c.normal), WithinRel(-0.5 * before.dot(c.normal), 1e-11));
+          CHECK((j.tangential.norm() > 0.0) == (friction > 0.0));
+        }
+      }
+    }
+    CHECK(hits == 1);
+  }
+}
+
+// The centre of mass of all bodies, each followed through its images, is on an epicycle of its own whatever
+// the collisions do: tested by the quantity that a body loses at an edge by a known amount.
+TEST_CASE("Collisions keep the momentum of the patch; an edge takes Omega Lx/2 a unit of mass") {
+  Space<double> space = patch(0.005, 0.3);
+  fill(space, 80, 2.0);
+  double expected = momentumAlong(space);
+  std::vector<double> x(space.n());
+  double scale = 0.0;
+  for (std::size_t step = 0; step < 400; ++step) {
+    for (std::size_t i = 0; i < space.n(); ++i) {
+      x[i] = space.body(i).position()[0];
+    }
+    space.computeDynamics(step);
+    for (std::size_t i = 0; i < space.n(); ++i) {
+      const double jump = std::round((space.body(i).position()[0] - x[i]) / box[0]);
+      // x + k Lx and v_y - (3/2) Omega k Lx: v_y + 2 Omega x gains Omega k Lx/2.
+      expected += space.body(i).mass() * jump * omega * box[0] / 2;
+      scale += jump == 0 ? 0 : 1;
+    }
+  }
+  CHECK(scale > 10);
+  CHECK(space.energyLedger().restitution > 10.0);
+  // Moving overlapping pairs apart keeps sum m x, blows across an edge the sum of impulses.
+  CHECK_THAT(momentumAlong(space), WithinAbs(expected, 1e-11 * 80));
+}
+
+TEST_CASE(
+    "The ledger of a patch closes: what collisions take the shear brings, with overlap removed or not") {
+  for (const double factor : {0.0, 0.4}) {
+    Space<double> space = patch(0.01, 0.3);
+    space.setPositionalCorrectionFactor(factor);
+    fill(space, 80, 2.0);
+    const double before = space.energyLedger().total();
+    advance(space, 1200);
+    const EnergyLedger<double> ledger = space.energyLedger();
+    CHECK(ledger.restitution > 100.0);
+    CHECK(ledger.friction > 10.0);
+    CHECK(-ledger.work > 100.0);
+    CHECK((ledger.correction == 0.0) == (factor == 0.0));
+    // Nothing in it is of the order of the step: exact drifts, exact blows, exact wraps.
+    CHECK_THAT(ledger.total(), WithinAbs(before, 1e-10 * ledger.restitution));
+  }
+}
+
+TEST_CASE("A patch continues bit for bit from a file, at any phase of its shear") {
+  const auto begin = [] {
+    SimulationConfig<double> config = patchConfig(0.01);
+    config.coeffFriction = 0.3;
+    Space<double> space(config);
+    space.setDomain(Domain<double>::shearPeriodic(box, omega, 3.6));
+    fill(space, 60, 2.0);
+    return space;
+  };
+  const TemporaryFile file("patch");
+  Space<double> whole = begin();
+  advance(whole, 237);
+  whole.save(file.path());
+  Space<double> again;
+  again.restore(file.path());
+  CHECK(again.domain() == whole.domain());
+  CHECK(again.domain().verticalFrequency() == 3.6);
+  advance(whole, 200);
+  advance(again, 200);
+  CHECK(sameBits(stateOf(whole), stateOf(again)));
+  CHECK(again.energyLedger().total() == whole.energyLedger().total());
+}
+
+TEST_CASE("A change of the frame, and bodies that come and go in it, are booked") {
+  Space<double> space = patch(0.01);
+  fill(space, 40, 0.5);
+  advance(space, 10);
+  const double before = space.energyLedger().total();
+  space.removeBody(BodyId{7});
+  CHECK_THAT(space.energyLedger().total(), WithinRel(before, 1e-13));
+  space.addBody(ball({3, 3, 3.5}, {0, -4.5, 0}, 0.3, 2.0));
+  CHECK_THAT(space.energyLedger().total(), WithinRel(before, 1e-13));
+  space.setDomain(Domain<double>::shearPeriodic(box, 2 * omega));
+  CHECK_THAT(space.energyLedger().total(), WithinRel(before, 1e-13));
+  CHECK(std::abs(space.energyLedger().exchange) > 1.0);
+}
