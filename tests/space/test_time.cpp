@@ -107,6 +107,27 @@ TEST_CASE("Diagnostics log energies every logFrequency steps, to where the user 
   CHECK(lines.size() == 3);
 }
 
+TEST_CASE("Diagnostics of a heap say what each process took, and whether the contacts carry it") {
+  SimulationConfig<double> config = quiet(1e-3);
+  config.diagnosticsEnabled = true;
+  config.logFrequency = 1000;
+  Space<double> space(config);
+  space.addPlane({0, 0, 1}, 0.0);
+  space.setUniformField({0, 0, -9.81});
+  space.addBody(at({0, 0, 0.1}, {0, 0, 0}));
+  std::vector<std::string> lines;
+  space.setLog([&](const char* line) { lines.emplace_back(line); });
+  for (std::size_t i = 1; i <= 1000; ++i) {
+    space.computeDynamics(i);
+  }
+  REQUIRE(lines.size() == 2);
+  for (const char* process : {"restitution", "friction", "damping", "correction", "work", "exchange"}) {
+    CHECK_THAT(lines[0], ContainsSubstring(process));
+  }
+  CHECK_THAT(lines[1], ContainsSubstring("contacts 1 ") && ContainsSubstring("virial residual") &&
+                           ContainsSubstring("weight residual"));
+}
+
 TEST_CASE("Without a log of the user's own the lines go to standard output") {
   SimulationConfig<double> config = quiet(0.5);
   config.diagnosticsEnabled = true;

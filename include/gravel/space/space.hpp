@@ -9,6 +9,7 @@
 #include <gravel/dynamics/damping.hpp>
 #include <gravel/fwd.hpp>
 #include <gravel/output/conserved.hpp>
+#include <gravel/output/contact_virial.hpp>
 #include <gravel/output/energy_ledger.hpp>
 #include <gravel/space/contact_stage.hpp>
 #include <gravel/space/force_stage.hpp>
@@ -139,6 +140,13 @@ class Space : public Settings<Scalar> {
   /// Impulses [N s] over the last step, in the order of contacts(). A contact's mean force is its impulse
   /// over getPreviousTimeStep().
   std::vector<ContactImpulse<Scalar>> contactImpulses() const { return contact_.impulses(); }
+  /// Terms of the virial theorem over the last step: an error of the forces in a whole heap at rest that
+  /// needs no reference, see `ContactVirial::residual()`.
+  ContactVirial<Scalar> contactVirial() const;
+  /// What presses on boundaries and fixed bodies over the last step [N], against the weight in the field.
+  SupportedWeight<Scalar> supportedWeight() const;
+  /// Force [N] on a plane over the last step. \throws std::out_of_range if no plane has this number
+  Vector planeForce(std::size_t plane) const;
   /// Bodies that touch each body, by index, at the last step.
   std::vector<std::vector<std::size_t>> collisionGraph() const;
   /// Seconds by phase, and what was skipped and why, on standard output.

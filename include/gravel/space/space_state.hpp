@@ -59,6 +59,31 @@ auto Space<Scalar, Layout>::getDataForDisplay() const
 }
 
 template <Real Scalar, class Layout>
+ContactVirial<Scalar> Space<Scalar, Layout>::contactVirial() const {
+  const std::vector<ContactImpulse<Scalar>> impulses = contactImpulses();
+  return gravel::contactVirial<Scalar, Layout>(bodies_, contacts(), impulses, previous_dt_);
+}
+
+template <Real Scalar, class Layout>
+SupportedWeight<Scalar> Space<Scalar, Layout>::supportedWeight() const {
+  const std::vector<ContactImpulse<Scalar>> impulses = contactImpulses();
+  return gravel::supportedWeight<Scalar, Layout>(bodies_, contacts(), impulses, previous_dt_, force_.field);
+}
+
+template <Real Scalar, class Layout>
+auto Space<Scalar, Layout>::planeForce(std::size_t plane) const -> Vector {
+  (void)contact_.boundaries.at(plane);
+  Vector impulse = Vector::Zero();
+  const std::vector<ContactImpulse<Scalar>> impulses = contactImpulses();
+  for (std::size_t k = 0; k < impulses.size(); ++k) {
+    if (contacts()[k].key2 == boundaryKey(plane)) {
+      impulse += impulses[k].normal * contacts()[k].normal + impulses[k].tangential;
+    }
+  }
+  return previous_dt_ > Scalar(0) ? Vector(impulse / previous_dt_) : impulse;
+}
+
+template <Real Scalar, class Layout>
 std::vector<std::vector<std::size_t>> Space<Scalar, Layout>::collisionGraph() const {
   std::vector<std::vector<std::size_t>> graph(n());
   for (const Contact<Scalar>& contact : contacts()) {
@@ -99,8 +124,18 @@ void Space<Scalar, Layout>::logSystemEnergy(std::size_t iteration) {
   const auto text = [](const Scalar& x) { return detail::formatReal(x); };
   logLine(("gravel: step " + std::to_string(iteration) + " t " + text(time_) + " s dt " + text(previous_dt_) +
            " s kinetic " + text(e.kinetic) + " J rotational " + text(e.rotational) + " J potential " +
-           text(e.potential) + " J dissipated " + text(e.dissipated()) + " J total " + text(total) + " J")
+           text(e.potential) + " J restitution " + text(e.restitution) + " J friction " + text(e.friction) +
+           " J damping " + text(e.damping) + " J correction " + text(e.correction) + " J work " +
+           text(e.work) + " J exchange " + text(e.exchange) + " J total " + text(total) + " J")
               .c_str());
+  if (contactCount() > 0) {
+    const ContactReport<Scalar>& report = contactReport();
+    logLine(("gravel: step " + std::to_string(iteration) + " contacts " + std::to_string(contactCount()) +
+             " sweeps " + std::to_string(report.iterations) + " residual " + text(report.residual) +
+             " virial residual " + text(contactVirial().residual()) + " weight residual " +
+             text(supportedWeight().residual()))
+                .c_str());
+  }
   const Scalar inPlay = e.kinetic + e.rotational + abs(e.potential);
   if (!isFinite(total)) {
     logLine("gravel: warning: the energy is not finite; the state cannot be trusted, take a shorter step");

@@ -1,0 +1,136 @@
+#pragma once
+
+/// \file
+/// Errors of a whole heap without a reference solution: do its contacts carry what presses on them?
+
+#include <gravel/contact/contact.hpp>
+#include <gravel/contact/contact_settings.hpp>
+#include <gravel/core/parallel.hpp>
+#include <gravel/output/conserved.hpp>
+
+#include <span>
+
+namespace gravel {
+
+/// Terms of the virial theorem over a step, about the centre of mass [J]:
+///   I''/2 = motion + forces + contacts + boundaries,   I = sum m x^2.
+/// In a heap at rest the sum vanishes, whatever friction does: forces along the line of two centres do the
+/// work N d, friction across it none.
+template <Real Scalar>
+struct ContactVirial {
+  Scalar motion = Scalar(0);      ///< 2 T, twice the kinetic energy about the centre of mass
+  Scalar forces = Scalar(0);      ///< sum F.x of gravity, field and the user's force; -|W| for gravity alone
+  Scalar contacts = Scalar(0);    ///< sum N d of pairs: normal force times distance of the centres
+  Scalar boundaries = Scalar(0);  ///< sum F.x of boundaries and fixed bodies on what they hold
+
+  /// I''/2: how fast a heap that should rest expands or falls together.
+  Scalar sum() const { return motion + forces + contacts + boundaries; }
+  /// |sum| over the largest term; 0 where there is nothing.
+  Scalar residual() const {
+    const auto size = [](const Scalar& x) { return x < Scalar(0) ? Scalar(-x) : x; };
+    const Scalar scale =
+        std::max(std::max(size(motion), size(forces)), std::max(size(contacts), size(boundaries)));
+    return scale > Scalar(0) ? Scalar(size(sum()) / scale) : Scalar(0);
+  }
+};
+
+/// What presses on boundaries and fixed bodies, against the weight of all movable bodies in a uniform field.
+template <Real Scalar>
+struct SupportedWeight {
+  Vector3<Scalar> load = Vector3<Scalar>::Zero();    ///< [N] on boundaries and fixed bodies, over the step
+  Vector3<Scalar> weight = Vector3<Scalar>::Zero();  ///< [N] sum m g
+
+  /// |load - weight| along the field over the weight; 0 without a field. A heap that moves inside is off by
+  /// the acceleration of its centre of mass.
+  Scalar residual() const {
+    const Scalar w_sq = weight.squaredNorm();
+    const Scalar missing = weight.dot(Vector3<Scalar>(load - weight));
+    return w_sq > Scalar(0) ? Scalar((missing < Scalar(0) ? Scalar(-missing) : missing) / w_sq) : Scalar(0);
+  }
+};
+
+/// Positions, velocities and `forces()` of bodies that are moved by contacts with these impulses [N s] over a
+/// step h [s]. Zero contacts if h is 0. Fixed bodies take no part but as what others lean on. O(bodies +
+/// contacts); the same bits for any number of threads.
+template <Real Scalar, class Layout>
+ContactVirial<Scalar> contactVirial(const Bodies<Scalar, Layout>& bodies,
+                                    std::span<const Contact<Scalar>> contacts,
+                                    std::span<const ContactImpulse<Scalar>> impulses, const Scalar& h) {
+  using Sum = Eigen::Array<Scalar, 7, 1>;
+  const Sum of = orderedSum(bodies.size(), 1024, Sum(Sum::Zero()), [&](std::size_t begin, std::size_t end) {
+    Sum part = Sum::Zero();
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto body = bodies[i];
+      if (!body.isFixed()) {
+        const Scalar m = body.mass();
+        part[0] += m;
+        part.template segment<3>(1) += Vector3<Scalar>(m * Vector3<Scalar>(body.position())).array();
+        part.template segment<3>(4) += Vector3<Scalar>(m * Vector3<Scalar>(body.velocity())).array();
+      }
+    }
+    return part;
+  });
+  ContactVirial<Scalar> virial;
+  if (!(of[0] > Scalar(0))) {
+    return virial;
+  }
+  const Vector3<Scalar> centre = of.template segment<3>(1).matrix() / of[0];
+  const Vector3<Scalar> drift = of.template segment<3>(4).matrix() / of[0];
+  using Pair = Eigen::Array<Scalar, 2, 1>;
+  const Pair terms =
+      orderedSum(bodies.size(), 1024, Pair(Pair::Zero()), [&](std::size_t begin, std::size_t end) {
+        Pair part = Pair::Zero();
+        for (std::size_t i = begin; i < end; ++i) {
+          const auto body = bodies[i];
+          if (!body.isFixed()) {
+            part[0] += Scalar(body.mass()) * Vector3<Scalar>(body.velocity() - drift).squaredNorm();
+            part[1] +=
+                Vector3<Scalar>(body.force()).dot(Vector3<Scalar>(Vector3<Scalar>(body.position()) - centre));
+          }
+        }
+        return part;
+      });
+  virial.motion = terms[0];
+  virial.forces = terms[1];
+  for (std::size_t k = 0; k < impulses.size() && h > Scalar(0); ++k) {
+    const Contact<Scalar>& c = contacts[k];
+    const ContactImpulse<Scalar>& j = impulses[k];
+    const bool boundary = c.second == staticPartner;
+    if (!boundary && !bodies[c.first].isFixed() && !bodies[c.second].isFixed()) {
+      virial.contacts += j.normal * (c.arm1 + c.arm2) / h;
+    } else {
+      const Vector3<Scalar> onSecond = (j.normal * c.normal + j.tangential) / h;
+      const bool holdsSecond = !boundary && bodies[c.first].isFixed();
+      const Vector3<Scalar> x = bodies[holdsSecond ? c.second : c.first].position();
+      virial.boundaries +=
+          (holdsSecond ? onSecond : Vector3<Scalar>(-onSecond)).dot(Vector3<Scalar>(x - centre));
+    }
+  }
+  return virial;
+}
+
+/// Load on boundaries and fixed bodies by contacts with these impulses over a step h, and the weight.
+template <Real Scalar, class Layout>
+SupportedWeight<Scalar> supportedWeight(const Bodies<Scalar, Layout>& bodies,
+                                        std::span<const Contact<Scalar>> contacts,
+                                        std::span<const ContactImpulse<Scalar>> impulses, const Scalar& h,
+                                        const Vector3<Scalar>& field) {
+  SupportedWeight<Scalar> support;
+  Scalar mass(0);
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    mass += bodies[i].isFixed() ? Scalar(0) : Scalar(bodies[i].mass());
+  }
+  support.weight = mass * field;
+  for (std::size_t k = 0; k < impulses.size() && h > Scalar(0); ++k) {
+    const Contact<Scalar>& c = contacts[k];
+    const Vector3<Scalar> onSecond = (impulses[k].normal * c.normal + impulses[k].tangential) / h;
+    if (c.second == staticPartner || bodies[c.second].isFixed()) {
+      support.load += onSecond;
+    } else if (bodies[c.first].isFixed()) {
+      support.load -= onSecond;
+    }
+  }
+  return support;
+}
+
+}  // namespace gravel

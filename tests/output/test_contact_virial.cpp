@@ -1,0 +1,80 @@
+#include "laws/laws.hpp"
+#include "support/catch.hpp"
+
+using namespace gravel;
+using namespace gravel::test;
+
+TEST_CASE("Two spheres that rest on each other by their gravity: N d is G m1 m2 / d") {
+  SimulationConfig<double> config = plain(1e-3);
+  config.G = 2.0;
+  Space<double> space(config);
+  space.addBody(ball({5, 0, 0}, {0, 0, 0}, 0.6, 3.0));
+  space.addBody(ball({5, 0.8, 0.6}, {0, 0, 0}, 0.4, 1.0));
+  advance(space, 200);
+  const ContactVirial<double> virial = space.contactVirial();
+  CHECK_THAT(virial.contacts, WithinRel(6.0, 1e-9));
+  CHECK_THAT(virial.forces, WithinRel(-6.0, 1e-9));
+  CHECK(virial.boundaries == 0.0);
+  CHECK(virial.residual() < 1e-9);
+}
+
+TEST_CASE("Bodies that do not touch: the sum is half the second derivative of sum m x^2") {
+  SimulationConfig<double> config = plain(1e-4);
+  config.G = 1.0;
+  Space<double> space(config);
+  space.addBody(ball({0, 0, 0}, {0.3, 7, 0}, 0.0, 2.0));
+  space.addBody(ball({1.5, 0, 0.2}, {0, 8, 0.4}, 0.0, 1.0));
+  std::vector<double> spread;
+  ContactVirial<double> middle;
+  for (std::size_t i = 0; i < 3; ++i) {
+    space.computeDynamics(i);
+    const Vec centre = space.conserved().centreOfMass;
+    spread.push_back(2.0 * (space.body(0).position() - centre).squaredNorm() +
+                     (space.body(1).position() - centre).squaredNorm());
+    middle = i == 1 ? space.contactVirial() : middle;
+  }
+  const double second = (spread[2] - 2 * spread[1] + spread[0]) / 1e-8;
+  // Central difference of numbers near 1 with steps of 1e-4: 4e-16/1e-8.
+  CHECK_THAT(middle.sum(), WithinAbs(second / 2, 2e-7));
+  CHECK(std::abs(middle.sum()) > 0.1);
+  CHECK(middle.contacts == 0.0);
+}
+
+// Two balls, one on the floor, the other leaning between it and a fixed ball; friction in every contact.
+TEST_CASE("Floors, walls and fixed bodies carry what rests on them, and the virial counts them") {
+  SimulationConfig<double> config = plain(1e-3);
+  config.coeffFriction = 0.5;
+  config.coeffStaticFriction = 0.6;
+  config.coeffRestitution = 0.0;
+  Space<double> space(config);
+  const double g = 9.81;
+  space.setUniformField({0, 0, -g});
+  const std::size_t floor = space.addPlane({0, 0, 1}, 0.0);
+  const std::size_t wall = space.addPlane({1, 0, 0}, -0.5);
+  space.addBody(ball({0, 0, 0.5}, {0, 0, 0}, 0.5, 2.0));
+  space.addBody(ball({0.75, 0, 1.2}, {0, 0, 0}, 0.5, 1.0));
+  Body<double> fixed = ball({1.5, 0, 0.5}, {0, 0, 0}, 0.5, 7.0);
+  fixed.fixed = true;
+  space.addBody(fixed);
+  advance(space, 3000);
+  const SupportedWeight<double> support = space.supportedWeight();
+  CHECK(support.weight == Vec(0, 0, -3 * g));
+  CHECK(support.residual() < 1e-9);
+  CHECK((support.load - support.weight).norm() < 1e-8);  // at rest the forces across cancel as well
+  CHECK(space.planeForce(floor)[2] < -2 * g);
+  CHECK(space.planeForce(floor)[2] > -3 * g);
+  CHECK(space.planeForce(wall)[0] < -0.1);
+  CHECK_THROWS_AS(space.planeForce(5), std::out_of_range);
+  const ContactVirial<double> virial = space.contactVirial();
+  CHECK(virial.contacts > 1.0);
+  CHECK(std::abs(virial.boundaries) > 1.0);
+  CHECK(virial.residual() < 1e-9);
+}
+
+TEST_CASE("Without bodies, steps or a field there is nothing to carry") {
+  Space<double> space(plain(1e-3));
+  CHECK(space.contactVirial().residual() == 0.0);
+  CHECK(space.supportedWeight().residual() == 0.0);
+  space.addBody(ball({0, 0, 0}, {0, 0, 0}, 1.0));
+  CHECK(space.contactVirial().sum() == 0.0);
+}
