@@ -5,6 +5,7 @@
 
 #include <gravel/core/check.hpp>
 #include <gravel/core/parallel.hpp>
+#include <gravel/gravity/few_bodies.hpp>
 #include <gravel/gravity/pair_tiles.hpp>
 
 #include <algorithm>
@@ -31,6 +32,11 @@ class DirectSum {
   template <class Positions, class Masses, class Accelerations>
   void accelerations(const Positions& positions, const Masses& masses, const S& G, const S& softening,
                      Accelerations&& out) {
+    if constexpr (detail::FewBodies<S>::usable) {
+      if (detail::FewBodies<S>::accelerations(positions, masses, G, softening, out)) {
+        return;
+      }
+    }
     gather(positions, masses, G, softening);
     table_.clearAccelerations();
     sumMutual();
