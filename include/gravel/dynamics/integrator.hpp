@@ -14,16 +14,6 @@ namespace detail {
 
 constexpr std::size_t bodyGrain = 2048;
 
-/// A number of a table in the scalar's own precision.
-template <Real Scalar>
-Scalar fromTable(long double x) {
-  if constexpr (std::is_floating_point_v<Scalar> || !std::constructible_from<Scalar, long double>) {
-    return Scalar(static_cast<std::conditional_t<std::is_floating_point_v<Scalar>, Scalar, double>>(x));
-  } else {
-    return Scalar(x);
-  }
-}
-
 /// v += a kick; then x += v drift, and the orientation with it. One pass; fixed bodies stay.
 /// `torques` tells whether any angular acceleration can differ from zero.
 template <Real Scalar, class Layout>

@@ -32,6 +32,8 @@ enum class IntegratorKind : std::uint8_t {
   /// order 2, 1 evaluation, in the frame of a shear-periodic domain (dynamics/epicycle.hpp); in others
   /// velocity Verlet
   SymplecticEpicycle,
+  /// order 15, steps of its own choice, to rounding (dynamics/gauss_radau.hpp); bodies must be points
+  GaussRadau15,
 };
 
 /// One kick, one drift and the force evaluation after it.
@@ -46,15 +48,25 @@ struct IntegratorStage {
 struct IntegratorTraits {
   const char* name;
   int order;
-  int forceEvaluations;  ///< per step
-  bool symplectic;       ///< for a fixed step: energy errors are bounded
-  bool reversible;       ///< for a fixed step: -v and as many steps lead back, to rounding
-  bool contacts;         ///< bodies may touch
-  std::span<const IntegratorStage> stages;
+  int forceEvaluations;                     ///< per step; 0: as many as the method finds that it needs
+  bool symplectic;                          ///< for a fixed step: energy errors are bounded
+  bool reversible;                          ///< for a fixed step: -v and as many steps lead back, to rounding
+  bool contacts;                            ///< bodies may touch
+  std::span<const IntegratorStage> stages;  ///< none: no row of kicks and drifts
   long double lastKick;
 };
 
 namespace detail {
+
+/// A number of a table in the scalar's own precision.
+template <Real Scalar>
+Scalar fromTable(long double x) {
+  if constexpr (std::is_floating_point_v<Scalar> || !std::constructible_from<Scalar, long double>) {
+    return Scalar(static_cast<std::conditional_t<std::is_floating_point_v<Scalar>, Scalar, double>>(x));
+  } else {
+    return Scalar(x);
+  }
+}
 
 /// Stages of the palindrome w_1 … w_n … w_1 of velocity Verlet steps, of which the first half and the middle
 /// are given.
@@ -162,6 +174,8 @@ inline constexpr IntegratorTraits traitsOf(IntegratorKind kind) {
       return row("KahanLi8", 8, detail::kahanLi8Stages);
     case IntegratorKind::ForceGradient4:
       return row("ForceGradient4", 4, detail::forceGradient4Stages, false);
+    case IntegratorKind::GaussRadau15:
+      return {"GaussRadau15", 15, 0, false, false, false, {}, 0};
     case IntegratorKind::SymplecticEpicycle:
       return row("SymplecticEpicycle", 2, detail::verletStages);
     case IntegratorKind::VelocityVerlet:

@@ -13,6 +13,7 @@
 #include <gravel/output/energy_ledger.hpp>
 #include <gravel/space/contact_stage.hpp>
 #include <gravel/space/force_stage.hpp>
+#include <gravel/space/orbit_stage.hpp>
 #include <gravel/space/random_bodies.hpp>
 #include <gravel/space/settings.hpp>
 
@@ -228,6 +229,7 @@ class Space : public Settings<Scalar> {
   Scalar lastTotalEnergy_ = std::numeric_limits<double>::infinity();
   Scalar hookPower_ = Scalar(0);
 
+  OrbitStage<Scalar, Layout> orbits_;
   Compensation<Scalar> lost_;  // what kicks and drifts lost to rounding
 
   // Positions and masses at the last force evaluation: forces are renewed if somebody changed them.

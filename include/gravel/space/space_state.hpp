@@ -204,6 +204,7 @@ void Space<Scalar, Layout>::save(const std::string& path) const {
   saveBodies(bodies_, out);
   const std::vector<Scalar> lost = lost_.lostParts(bodies_);
   out.array("lost parts", lost.data(), lost.size());
+  orbits_.save(out);
   out.write(path);
 }
 
@@ -223,10 +224,13 @@ void Space<Scalar, Layout>::restore(const std::string& path) {
   gravel::Bodies<Scalar, SoA> bodies = loadBodies<Scalar>(in);
   bodies.skipIds(BodyId{numbers.nextId});
   const std::vector<Scalar> lost = in.array<Scalar>("lost parts");
+  OrbitStage<Scalar, Layout> orbits;
+  orbits.load(in);
 
   // Nothing throws from here on but for want of memory.
   bodies_.assign(bodies);
   lost_.setLostParts(bodies_, lost);
+  orbits_ = std::move(orbits);
   this->config_ = config;
   contact_ = std::move(contact);
   force_.gravity.setKind(config.gravity);

@@ -82,7 +82,9 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration) {
     {
       const Profiler::Scope scope(profiler_, Phase::Integration);
       const HillFrame<Scalar> frame(contact_.domain);
-      if (frame.turns()) {
+      if (orbits_.moves(this->config_.integrator)) {
+        orbits_.advance(bodies_, h, force_, forces);
+      } else if (frame.turns()) {
         integrateEpicycle(frame, bodies_, h, force_.hasTorques(), forces, arrival, departure);
       } else {
         // Without mutual gravity runs are not long orbits, and nothing is carried.
@@ -123,6 +125,7 @@ template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::prepare() {
   bodies_.validateAll();
   contact_.materials.check(bodies_);
+  orbits_.check(this->config_.integrator, bodies_, contact_);
   if (!forcesValid_ || placesChanged()) {
     applyGravity();
     buildCollisionGraph();
@@ -205,6 +208,10 @@ void Space<Scalar, Layout>::updateAdaptiveTimeStep() {
     return;
   }
   const Profiler::Scope scope(profiler_, Phase::TimeStep);
+  if (orbits_.moves(c.integrator)) {
+    dt_ = orbits_.nextStep(bodies_, c);
+    return;
+  }
   const StepLimits<Scalar> limits{c.timeStepFactor, c.minTimeStep, c.timeStep};
   dt_ = stepFromMotion(bodies_, c.softening, limits, !contact_.boundaries.empty());
 }
