@@ -43,6 +43,7 @@ class Profiler {
     std::uint64_t calls = 0;
     std::uint64_t skips = 0;
     const char* reason = nullptr;  ///< why it was skipped the last time; a string literal
+    const char* method = nullptr;  ///< how it was done the last time, where there is a choice; a literal
   };
 
   /// Times the rest of the enclosing scope. Where scopes nest, the outer one's clock stands still meanwhile,
@@ -70,24 +71,30 @@ class Profiler {
     entry.reason = reason;
   }
 
+  void method(Phase phase, const char* name) { entries_[static_cast<std::size_t>(phase)].method = name; }
+
   const Entry& entry(Phase phase) const { return entries_[static_cast<std::size_t>(phase)]; }
 
   void reset() { entries_ = {}; }
 
-  /// One line a phase: seconds, share, calls, skips with the last reason.
+  /// One line a phase: seconds, share, calls, skips, the last method and the last reason to skip.
   void print(std::FILE* out) const {
     double total = 0.0;
     for (const Entry& entry : entries_) {
       total += entry.seconds;
     }
     std::fprintf(out, "%-18s %12s %7s %10s %10s  %s\n", "phase", "seconds", "share", "runs", "skips",
-                 "last reason to skip");
+                 "last method, last reason to skip");
     for (std::size_t p = 0; p < phaseCount; ++p) {
       const Entry& entry = entries_[p];
-      std::fprintf(out, "%-18s %12.6f %6.1f%% %10llu %10llu  %s\n", phaseName(static_cast<Phase>(p)),
+      std::fprintf(out, "%-18s %12.6f %6.1f%% %10llu %10llu  %s%s%s\n", phaseName(static_cast<Phase>(p)),
                    entry.seconds, total > 0.0 ? 100.0 * entry.seconds / total : 0.0,
                    static_cast<unsigned long long>(entry.calls), static_cast<unsigned long long>(entry.skips),
-                   entry.reason != nullptr ? entry.reason : "-");
+                   entry.method != nullptr ? entry.method : "",
+                   entry.method != nullptr && entry.reason != nullptr ? ", " : "",
+                   entry.reason != nullptr   ? entry.reason
+                   : entry.method != nullptr ? ""
+                                             : "-");
     }
     std::fprintf(out, "%-18s %12.6f\n", "total", total);
   }

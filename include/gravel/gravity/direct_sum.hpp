@@ -3,9 +3,9 @@
 /// \file
 /// Gravity by summing every pair: exact to rounding, mutual, and the same bits for any number of threads.
 
-#include <gravel/core/check.hpp>
 #include <gravel/core/parallel.hpp>
 #include <gravel/gravity/few_bodies.hpp>
+#include <gravel/gravity/gravity_units.hpp>
 #include <gravel/gravity/pair_tiles.hpp>
 
 #include <algorithm>
@@ -41,7 +41,7 @@ class DirectSum {
     table_.clearAccelerations();
     sumMutual();
     sumTracers();
-    const Factor factor(G, massExponent_ - 2 * lengthExponent_);
+    const auto factor = units_.acceleration(G);
     for (std::size_t row = 0; row < body_.size(); ++row) {
       if (body_[row] != filling) {
         out[body_[row]] = Vector3<S>(factor(table_.ax[row]), factor(table_.ay[row]), factor(table_.az[row]));
@@ -65,48 +65,12 @@ class DirectSum {
     for (const S& part : parts) {
       sum += part;
     }
-    return -Factor(G, 2 * massExponent_ - lengthExponent_)(sum);
+    return -units_.energy(G)(sum);
   }
 
  private:
   static constexpr std::size_t width = detail::PairTable<S>::width;
   static constexpr std::size_t filling = std::numeric_limits<std::size_t>::max();
-
-  /// x -> x G 2^exponent, out of range only if the result is.
-  class Factor {
-   public:
-    Factor(const S& G, int exponent) : mantissa_(G), first_(1), second_(1) {
-      if constexpr (std::is_floating_point_v<S>) {
-        int own = 0;
-        mantissa_ = std::frexp(G, &own);
-        exponent += own;
-        first_ = std::ldexp(S(1), exponent / 2);
-        second_ = std::ldexp(S(1), exponent - exponent / 2);
-      }
-    }
-    S operator()(const S& x) const { return x * mantissa_ * first_ * second_; }
-
-   private:
-    S mantissa_, first_, second_;
-  };
-
-  /// The power of two that brings x near 1; 0 for a scalar whose exponent cannot be had.
-  static int exponentOf(const S& x) {
-    if constexpr (std::is_floating_point_v<S>) {
-      constexpr int limit = std::numeric_limits<S>::max_exponent - 3;
-      return x > S(0) ? std::clamp(std::ilogb(x), -limit, limit) : 0;
-    } else {
-      return 0;
-    }
-  }
-
-  static S power(int exponent) {
-    if constexpr (std::is_floating_point_v<S>) {
-      return std::ldexp(S(1), exponent);
-    } else {
-      return S(1);
-    }
-  }
 
   /// Bodies a block: small enough that two blocks stay in the nearest cache and there is work for many
   /// threads, large enough that the reductions of a source do not count.
@@ -131,32 +95,10 @@ class DirectSum {
   template <class Positions, class Masses>
   void gather(const Positions& positions, const Masses& masses, const S& G, const S& softening) {
     const std::size_t n = positions.size();
-    detail::require("G", G, detail::anyFinite<S>());
-    detail::require("softening", softening, detail::nonNegative<S>());
-    if (masses.size() != n) {
-      detail::refuse("length of masses", std::to_string(masses.size()),
-                     "that of positions, " + std::to_string(n));
-    }
-    Vector3<S> low = Vector3<S>::Zero();
-    Vector3<S> high = Vector3<S>::Zero();
-    S heaviest(0);
-    std::size_t sources = 0;
-    for (std::size_t i = 0; i < n; ++i) {
-      const Vector3<S> half = positions[i] / S(2);  // the extent of two huge numbers is in range
-      const S m = masses[i];
-      if (!isFinite(half) || !isFinite(m) || m < S(0)) {
-        refuseBody(i, positions[i], m);
-      }
-      low = i == 0 ? half : low.cwiseMin(half);
-      high = i == 0 ? half : high.cwiseMax(half);
-      heaviest = std::max(heaviest, m);
-      sources += m > S(0) ? 1U : 0U;
-    }
-    const S extent = std::max(S((high - low).maxCoeff()), softening);
-    lengthExponent_ = exponentOf(extent);
-    massExponent_ = exponentOf(heaviest);
-    const S perLength = power(-lengthExponent_);
-    const S perMass = power(-massExponent_);
+    units_ = detail::GravityUnits<S>(positions, masses, G, softening);
+    const S perLength = units_.perLength();
+    const S perMass = units_.perMass();
+    const std::size_t sources = units_.sources();
     table_.softening_sq = (softening * perLength) * (softening * perLength);
     table_.sourceEnd = wholeTiles(sources);
     table_.resize(table_.sourceEnd + wholeTiles(n - sources));
@@ -175,14 +117,6 @@ class DirectSum {
         place(row, Vector3<S>(table_.x[from - 1], table_.y[from - 1], table_.z[from - 1]), S(0));
       }
     }
-  }
-
-  [[noreturn]] static void refuseBody(std::size_t i, const Vector3<S>& x, const S& m) {
-    const std::string who = " of body " + std::to_string(i) + " in a gravity sum";
-    if (!isFinite(x)) {
-      detail::refuse("position" + who, detail::formatVector(x), "finite");
-    }
-    detail::refuse("mass" + who, detail::formatReal(m), "finite, >= 0");
   }
 
   static std::size_t wholeTiles(std::size_t n) { return (n + width - 1) / width * width; }
@@ -230,8 +164,7 @@ class DirectSum {
 
   detail::PairTable<S> table_;
   std::vector<std::size_t> body_;  ///< the body of each row
-  int lengthExponent_ = 0;
-  int massExponent_ = 0;
+  detail::GravityUnits<S> units_;
 };
 
 }  // namespace gravel

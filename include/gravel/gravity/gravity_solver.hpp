@@ -4,39 +4,42 @@
 /// The choice of gravity method at run time, behind two functions.
 
 #include <gravel/gravity/direct_sum.hpp>
-
-#include <variant>
+#include <gravel/gravity/fast_multipole.hpp>
 
 namespace gravel {
 
-/// `Automatic` takes the cheapest method that keeps the tolerance.
-enum class GravityKind { Automatic, Direct };
+/// `Automatic` takes the method that is expected to be cheaper for the number of bodies and the tolerance.
+enum class GravityKind { Automatic, Direct, FastMultipole };
 
-/// To add a method: one header with the same two functions, one line in the variant, one name in the
-/// enumeration and in `setKind`.
+/// To add a method: one header with the same functions, a member, a name in the enumeration, and a case in
+/// `visit`.
 template <Real S>
 class GravitySolver {
  public:
   explicit GravitySolver(GravityKind kind = GravityKind::Automatic) { setKind(kind); }
 
   GravityKind kind() const { return kind_; }
-  void setKind(GravityKind kind) {
-    kind_ = kind;
-    method_.template emplace<DirectSum<S>>();
-  }
+  void setKind(GravityKind kind) { kind_ = kind; }
 
   /// Promised rms of |a - a_exact| / |a_exact|. The direct sum errs by rounding only, whatever is asked.
   /// \param tolerance in (0, 1]. \throws std::invalid_argument otherwise
-  void setTolerance(const S& tolerance) {
-    if (!(tolerance > S(0)) || !(tolerance <= S(1))) {
-      detail::refuse("gravity tolerance", detail::formatReal(tolerance), "above 0, at most 1");
-    }
-    tolerance_ = tolerance;
-  }
-  const S& tolerance() const { return tolerance_; }
+  void setTolerance(const S& tolerance) { multipoles_.setTolerance(tolerance); }
+  const S& tolerance() const { return multipoles_.tolerance(); }
 
-  /// The method in use.
-  const char* name() const { return "direct sum"; }
+  /// The method for that many bodies, never `Automatic`. A function of the number, of the tolerance and of
+  /// the scalar alone: a run that is taken up again takes it again.
+  GravityKind choice(std::size_t bodies) const {
+    if (kind_ != GravityKind::Automatic) {
+      return kind_;
+    }
+    return FastMultipole<S>::isWorthwhile(bodies, tolerance()) ? GravityKind::FastMultipole
+                                                               : GravityKind::Direct;
+  }
+
+  /// Its name in reports.
+  const char* name(std::size_t bodies) const {
+    return choice(bodies) == GravityKind::Direct ? "direct sum" : "fast multipole method";
+  }
 
   /// out[i] [m s^-2] for every i; see DirectSum. Nothing is summed when G is 0.
   template <class Positions, class Masses, class Accelerations>
@@ -48,23 +51,34 @@ class GravitySolver {
       }
       return;
     }
-    std::visit([&](auto& method) { method.accelerations(positions, masses, G, softening, out); }, method_);
+    visit(positions.size(),
+          [&](auto& method) { method.accelerations(positions, masses, G, softening, out); });
   }
 
   /// [J]; see DirectSum.
   template <class Positions, class Masses>
   S potentialEnergy(const Positions& positions, const Masses& masses, const S& G, const S& softening) {
-    if (G == S(0)) {
-      return S(0);
+    S energy(0);
+    if (!(G == S(0))) {
+      visit(positions.size(),
+            [&](auto& method) { energy = method.potentialEnergy(positions, masses, G, softening); });
     }
-    return std::visit([&](auto& method) { return method.potentialEnergy(positions, masses, G, softening); },
-                      method_);
+    return energy;
   }
 
  private:
+  template <class F>
+  void visit(std::size_t bodies, F&& f) {
+    if (choice(bodies) == GravityKind::Direct) {
+      f(direct_);
+    } else {
+      f(multipoles_);
+    }
+  }
+
   GravityKind kind_ = GravityKind::Automatic;
-  S tolerance_ = S(1e-5);
-  std::variant<DirectSum<S>> method_;
+  DirectSum<S> direct_;
+  FastMultipole<S> multipoles_;
 };
 
 }  // namespace gravel

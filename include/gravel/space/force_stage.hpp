@@ -33,6 +33,7 @@ class ForceStage {
     const char* reason = reasonToSkip(bodies, G);
     if (reason == nullptr) {
       const Profiler::Scope scope(profiler, Phase::Gravity);
+      profiler.method(Phase::Gravity, gravity.name(n));
       gravity.accelerations(bodies.positions(), bodies.masses(), G, softening, bodies.accelerations());
     } else {
       profiler.skip(Phase::Gravity, reason);
@@ -56,7 +57,7 @@ class ForceStage {
     }
   }
 
-  /// Mutual gravity and the field [J]. O(N^2) by the direct sum.
+  /// Mutual gravity and the field [J]. O(N^2) by the direct sum, O(N) by expansions, with their error.
   Scalar potentialEnergy(const Bodies<Scalar, Layout>& bodies, const Scalar& G, const Scalar& softening) {
     Scalar energy(0);
     if (reasonToSkip(bodies, G) == nullptr) {

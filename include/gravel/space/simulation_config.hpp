@@ -73,7 +73,7 @@ struct EnumNames<IntegratorKind> {
 };
 template <>
 struct EnumNames<GravityKind> {
-  static constexpr std::array<std::string_view, 2> values{"Automatic", "Direct"};
+  static constexpr std::array<std::string_view, 3> values{"Automatic", "Direct", "FastMultipole"};
 };
 template <>
 struct EnumNames<BroadPhaseKind> {

@@ -1,0 +1,207 @@
+#pragma once
+
+/// \file
+/// An octree over bodies for fast multipoles: cells around their centre of mass, children side by side, every
+/// cell's bodies side by side.
+
+#include <gravel/core/parallel.hpp>
+#include <gravel/core/types.hpp>
+#include <gravel/spatial/morton.hpp>
+
+#include <algorithm>
+#include <vector>
+
+namespace gravel::detail {
+
+/// S is the scalar of far-field work.
+template <Real S>
+struct TreeCell {
+  Vector3<S> centre = Vector3<S>::Zero();  ///< of mass; of the bodies where none has mass
+  S mass = S(0);
+  S radius = S(0);  ///< around the centre, holds all bodies
+  S spread = S(0);  ///< (sum m s^q / M)^(1/q), s the distance from the centre: radius of the mass
+  S weight = S(0);  ///< what errors at these bodies are measured against [acceleration]
+  std::uint32_t first = 0;
+  std::uint32_t last = 0;  ///< bodies [first, last)
+  std::uint32_t child = 0;
+  std::uint32_t children = 0;
+
+  bool isLeaf() const { return children == 0; }
+  std::uint32_t count() const { return last - first; }
+};
+
+/// Positions and masses in columns in the order of the tree; cells breadth first, the root at 0.
+template <Real S, Real F>
+struct BodyTree {
+  std::vector<S> x, y, z, m;
+  std::vector<std::uint32_t> body;  ///< the caller's index of each row
+  std::vector<TreeCell<F>> cells;
+  /// First cell of each group, and the end: no cell is in its parent's group, and parents come first.
+  std::vector<std::size_t> levels;
+
+  std::size_t size() const { return x.size(); }
+
+  void resize(std::size_t n) {
+    for (std::vector<S>* column : {&x, &y, &z, &m}) {
+      column->resize(n);
+    }
+    body.resize(n);
+  }
+
+  /// Sorts the rows and builds cells of at most `leafSize` bodies, more only where bodies (nearly) coincide.
+  /// Places must be finite. O(N log N).
+  void build(std::uint32_t leafSize) {
+    cells.clear();
+    levels.clear();
+    keys_.resize(size());
+    if (size() == 0) {
+      return;
+    }
+    cells.push_back({});
+    cells[0].last = static_cast<std::uint32_t>(size());
+    frames_.assign(1, Frame{assignKeys(0, cells[0].last), 0});
+    smallest_ = frames_[0].edge * S(0x1p-40);
+    levels.assign(1, 0);
+    for (std::size_t begin = 0; begin < cells.size();) {
+      const std::size_t end = cells.size();
+      for (std::size_t c = begin; c < end; ++c) {
+        split(c, leafSize);
+      }
+      levels.push_back(end);
+      begin = end;
+    }
+    splitSparse();
+  }
+
+ private:
+  struct Key {
+    std::uint64_t key;
+    std::uint32_t row;
+  };
+
+  /// The cube of a cell.
+  struct Frame {
+    S edge;
+    std::uint8_t level;  ///< below the cube that its keys divide
+  };
+
+  /// Leaves much larger than where most bodies are, down to single bodies: their bodies feel the rest of the
+  /// system through one expansion, which is good in a small part of them only.
+  void splitSparse() {
+    edges_.resize(size());
+    for (std::size_t c = 0; c < cells.size(); ++c) {
+      if (cells[c].isLeaf()) {
+        std::fill(edges_.begin() + cells[c].first, edges_.begin() + cells[c].last, frames_[c].edge);
+      }
+    }
+    const auto middle = edges_.begin() + static_cast<std::ptrdiff_t>(size() / 2);
+    std::nth_element(edges_.begin(), middle, edges_.end());
+    const S large = *middle * S(1.5);
+    const std::size_t old = cells.size();
+    for (std::size_t c = 0; c < old; ++c) {
+      if (cells[c].isLeaf() && frames_[c].edge > large) {
+        split(c, 1);
+      }
+    }
+    for (std::size_t begin = old; begin < cells.size();) {
+      const std::size_t end = cells.size();
+      levels.push_back(end);
+      for (std::size_t c = begin; c < end; ++c) {
+        if (frames_[c].edge > large) {
+          split(c, 1);
+        }
+      }
+      begin = end;
+    }
+  }
+
+  /// Keys of rows [first, last) in the cube around them, and the rows sorted by them. Returns the edge.
+  S assignKeys(std::uint32_t first, std::uint32_t last) {
+    S low[3], high[3];
+    const std::vector<S>* columns[3] = {&x, &y, &z};
+    S edge(0);
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::vector<S>& column = *columns[axis];
+      low[axis] = high[axis] = column[first];
+      for (std::uint32_t i = first; i < last; ++i) {
+        low[axis] = column[i] < low[axis] ? column[i] : low[axis];
+        high[axis] = high[axis] < column[i] ? column[i] : high[axis];
+      }
+      edge = std::max(edge, S(high[axis] - low[axis]));
+    }
+    parallelFor(last - first, 8192, [&](std::size_t k) {
+      const std::size_t i = first + k;
+      keys_[i] = {mortonKey(mortonCell(x[i], low[0], edge), mortonCell(y[i], low[1], edge),
+                            mortonCell(z[i], low[2], edge)),
+                  static_cast<std::uint32_t>(i)};
+    });
+    std::sort(keys_.begin() + first, keys_.begin() + last,
+              [](const Key& a, const Key& b) { return a.key < b.key || (a.key == b.key && a.row < b.row); });
+    for (std::vector<S>* column : {&x, &y, &z, &m}) {
+      permute(*column, scratch_, first, last);
+    }
+    permute(body, bodyScratch_, first, last);
+    return edge;
+  }
+
+  template <class T>
+  void permute(std::vector<T>& column, std::vector<T>& scratch, std::uint32_t first, std::uint32_t last) {
+    scratch.resize(size());
+    for (std::uint32_t i = first; i < last; ++i) {
+      scratch[i] = column[keys_[i].row];
+    }
+    std::copy(scratch.begin() + first, scratch.begin() + last, column.begin() + first);
+  }
+
+  static constexpr int bits = 21;
+
+  void split(std::size_t c, std::uint32_t leafSize) {
+    const std::uint32_t first = cells[c].first;
+    const std::uint32_t last = cells[c].last;
+    if (last - first <= leafSize) {
+      return;
+    }
+    Frame frame = frames_[c];
+    std::uint8_t& level = frame.level;
+    // Down to the first level that tells bodies apart; a new cube where the keys are used up.
+    while (level == bits || digit(first, level) == digit(last - 1, level)) {
+      if (level < bits) {
+        ++level;
+        frame.edge *= S(0.5);
+        continue;
+      }
+      frame = {assignKeys(first, last), 0};
+      if (!(frame.edge > smallest_)) {
+        return;
+      }
+    }
+    const auto childBegin = static_cast<std::uint32_t>(cells.size());
+    for (std::uint32_t begin = first; begin < last;) {
+      const std::uint64_t own = digit(begin, level);
+      const auto end = static_cast<std::uint32_t>(
+          std::partition_point(keys_.begin() + begin, keys_.begin() + last,
+                               [&](const Key& k) { return (k.key >> shift(level) & 7U) <= own; }) -
+          keys_.begin());
+      TreeCell<F> child;
+      child.first = begin;
+      child.last = end;
+      cells.push_back(child);
+      frames_.push_back({frame.edge * S(0.5), static_cast<std::uint8_t>(level + 1)});
+      begin = end;
+    }
+    cells[c].child = childBegin;
+    cells[c].children = static_cast<std::uint32_t>(cells.size()) - childBegin;
+  }
+
+  static unsigned shift(int level) { return 3U * static_cast<unsigned>(bits - 1 - level); }
+  std::uint64_t digit(std::uint32_t row, int level) const { return keys_[row].key >> shift(level) & 7U; }
+
+  std::vector<Key> keys_;
+  std::vector<Frame> frames_;  ///< of each cell
+  std::vector<S> edges_;
+  S smallest_ = S(0);
+  std::vector<S> scratch_;
+  std::vector<std::uint32_t> bodyScratch_;
+};
+
+}  // namespace gravel::detail

@@ -1,0 +1,174 @@
+#pragma once
+
+/// \file
+/// What expansions do to one cell of sinks: gathers sources into batches, and passes local expansions on.
+
+#include <gravel/gravity/near_field.hpp>
+#include <gravel/gravity/tree_moments.hpp>
+
+namespace gravel::detail {
+
+/// Local expansions are plain arrays of `terms()` coefficients, from the order `first` on: 0 with the
+/// potential, 1 for the force alone.
+template <Real S, Real F, class Terms>
+class FarField {
+ public:
+  using Tree = BodyTree<S, F>;
+  using Moments = TreeMoments<S, F, Terms>;
+  using Cell = TreeCell<F>;
+
+  FarField(const Tree& tree, const Moments& moments, int order, int first, const S& softening_sq)
+      : tree_(tree),
+        moments_(moments),
+        order_(order),
+        first_(first),
+        softening_sq_(softening_sq),
+        terms_(moments.terms()),
+        regular_(terms_),
+        spread_(static_cast<std::size_t>(D::size(order))),
+        laneMoments_(terms_ * parts),
+        laneLocals_(terms_ * parts),
+        laneDerivatives_(spread_.size()),
+        laneRegular_(terms_) {}
+
+  std::size_t terms() const { return terms_; }
+
+  /// The local expansion of a cell's parent about the cell's own centre.
+  void shift(const Cell& parent, const F* from, const Cell& cell, F* to) {
+    const Vector3<F> t = cell.centre - parent.centre;
+    X::regular(order_, F(t[0]), F(t[1]), F(t[2]), regular_.data());
+    spreadOut(from);
+    X::contract(order_, first_, order_, regular_.data(), spread_.data(), to);
+  }
+
+  /// Starts a new cell of sinks.
+  void begin() {
+    batched_ = 0;
+    batches_ = 0;
+  }
+
+  void add(const Cell& sink, std::uint32_t source) {
+    waiting_[batched_++] = source;
+    if (batched_ == Batch::size) {
+      flush(sink);
+    }
+  }
+
+  /// Adds what all the sources make to the sink's local expansion.
+  void finish(const Cell& sink, F* local) {
+    if (batched_ > 0) {
+      flush(sink);
+    }
+    if (batches_ == 0) {
+      return;
+    }
+    const auto* lanes = reinterpret_cast<const F*>(laneLocals_.data());
+    for (std::size_t k = static_cast<std::size_t>(M::start(first_)); k < terms_; ++k) {
+      F sum(0);
+      for (std::size_t part = 0; part < parts; ++part) {
+        for (std::size_t w = 0; w < Batch::width; ++w) {
+          sum += lanes[(part * terms_ + k) * Batch::width + w];
+        }
+      }
+      local[k] += sum;
+    }
+  }
+
+  /// Adds a cell's local expansion at its bodies.
+  void evaluate(const Cell& cell, const F* local, SinkFields<S>& out) {
+    spreadOut(local);
+    for (std::uint32_t i = cell.first; i < cell.last; i += Batch::width) {
+      alignas(64) F r[3][Batch::width] = {};
+      const std::size_t count = std::min<std::size_t>(Batch::width, cell.last - i);
+      for (std::size_t w = 0; w < count; ++w) {
+        r[0][w] = F(tree_.x[i + w]) - cell.centre[0];
+        r[1][w] = F(tree_.y[i + w]) - cell.centre[1];
+        r[2][w] = F(tree_.z[i + w]) - cell.centre[2];
+      }
+      X::regular(order_, Batch::load(r[0]), Batch::load(r[1]), Batch::load(r[2]), laneRegular_.data());
+      V field[4] = {Batch::zero(), Batch::zero(), Batch::zero(),
+                    Batch::zero()};  // the potential and its derivatives by x, y, z
+      X::contract(order_, first_, 1, laneRegular_.data(), spread_.data(), field);
+      alignas(64) F values[4][Batch::width];
+      for (int k = 0; k < 4; ++k) {
+        Batch::store(values[k], field[k]);
+      }
+      for (std::size_t w = 0; w < count; ++w) {
+        out.ax[i + w] += S(values[1][w]);
+        out.ay[i + w] += S(values[2][w]);
+        out.az[i + w] += S(values[3][w]);
+        if (first_ == 0) {
+          out.potential[i + w] += S(values[0][w]);
+        }
+      }
+    }
+  }
+
+ private:
+  using X = Expansion<Terms>;
+  using M = typename X::M;
+  using D = typename X::D;
+  using Batch = FarBatch<F>;
+  using V = typename Batch::V;
+  static constexpr std::size_t parts = Batch::size / Batch::width;
+
+  void flush(const Cell& sink) {
+    if (batches_++ == 0) {
+      std::fill(laneLocals_.begin(), laneLocals_.end(), Batch::zero());
+    }
+    alignas(64) F r[5][Batch::size];
+    auto* lanes = reinterpret_cast<F*>(laneMoments_.data());
+    for (std::size_t w = 0; w < Batch::size; ++w) {
+      const std::uint32_t s = waiting_[w < batched_ ? w : 0];
+      const Cell& source = tree_.cells[s];
+      F r_sq = F(softening_sq_);
+      for (int axis = 0; axis < 3; ++axis) {
+        r[axis][w] = sink.centre[axis] - source.centre[axis];
+        r_sq += r[axis][w] * r[axis][w];
+      }
+      r[3][w] = r_sq;
+      const F* m = moments_.of(s);
+      F* to = lanes + w / Batch::width * terms_ * Batch::width + w % Batch::width;
+      for (std::size_t k = 0; k < terms_; ++k) {
+        to[k * Batch::width] = m[k];
+      }
+    }
+    using std::sqrt;
+    for (std::size_t w = 0; w < Batch::size; ++w) {
+      r[4][w] = w < batched_ ? F(F(1) / sqrt(r[3][w])) : F(0);
+      r[3][w] = F(-1) / r[3][w];
+    }
+    batched_ = 0;
+    for (std::size_t part = 0; part < parts; ++part) {
+      const std::size_t w = part * Batch::width;
+      FarOperators<Terms, V>::interact(order_, first_, Batch::load(r[0] + w), Batch::load(r[1] + w),
+                                       Batch::load(r[2] + w), Batch::load(r[3] + w), Batch::load(r[4] + w),
+                                       &laneMoments_[part * terms_], laneDerivatives_.data(),
+                                       &laneLocals_[part * terms_]);
+    }
+  }
+
+  /// A local expansion in the rows of derivatives.
+  void spreadOut(const F* local) {
+    for (int n = 0; n <= order_; ++n) {
+      for (int c = 0; c <= M::lastZ(n); ++c) {
+        std::copy_n(local + M::row(n, c), n - c + 1, spread_.data() + D::row(n, c));
+      }
+      X::fillTrace(n, spread_.data());
+    }
+  }
+
+  const Tree& tree_;
+  const Moments& moments_;
+  int order_;
+  int first_;
+  S softening_sq_;
+  std::size_t terms_;
+  std::vector<F> regular_, spread_;
+  std::vector<V> laneMoments_, laneLocals_, laneDerivatives_, laneRegular_;
+  std::array<std::uint32_t, Batch::size> waiting_{};
+  std::size_t batched_ = 0;
+  std::size_t batches_ = 0;
+};
+
+}  // namespace gravel::detail

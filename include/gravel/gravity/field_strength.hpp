@@ -1,0 +1,112 @@
+#pragma once
+
+/// \file
+/// A first look at the field: how strong it is where the bodies of each cell are, within a few ten per cent.
+
+#include <gravel/gravity/body_tree.hpp>
+
+namespace gravel::detail {
+
+/// Sets each cell's weight to share / sqrt(mean of 1/a^2) over its bodies, a the acceleration (G = 1) that
+/// groups of at most `groupSize` bodies feel at their centre from other cells as points. An error of that
+/// size at all of them has a relative rms of `share`. Accelerations below a thousandth of the mean count as
+/// that much. Needs the geometry of TreeMoments. About 100 pairs of cells a group.
+template <Real S, Real F>
+class FieldStrength {
+ public:
+  void compute(BodyTree<S, F>& tree, const F& share) {
+    const std::size_t n = tree.cells.size();
+    groups_.clear();
+    isBelow_.assign(n, 0);
+    for (std::uint32_t c = 0; c < n; ++c) {
+      const TreeCell<F>& cell = tree.cells[c];
+      const bool isGroup = isBelow_[c] == 0 && (cell.isLeaf() || cell.count() <= groupSize);
+      if (isGroup) {
+        groups_.push_back(c);
+      }
+      for (std::uint32_t child = cell.child; child < cell.child + cell.children; ++child) {
+        isBelow_[child] = isGroup || isBelow_[c] != 0 ? 1 : 0;
+      }
+    }
+    strength_.resize(groups_.size());
+    parallelForChunks(groups_.size(), 64, [&](std::size_t begin, std::size_t end) {
+      std::vector<std::uint32_t> todo;
+      for (std::size_t g = begin; g < end; ++g) {
+        strength_[g] = fieldAt(tree, tree.cells[groups_[g]], todo);
+      }
+    });
+    F mean(0);
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      mean += F(static_cast<double>(tree.cells[groups_[g]].count())) * strength_[g];
+    }
+    mean = mean / F(static_cast<double>(tree.size()));
+    shareOut(tree, share, F(mean * F(1e-3)));
+  }
+
+ private:
+  static constexpr std::uint32_t groupSize = 32;
+
+  static F fieldAt(const BodyTree<S, F>& tree, const TreeCell<F>& group, std::vector<std::uint32_t>& todo) {
+    using std::sqrt;
+    Vector3<F> sum = Vector3<F>::Zero();
+    todo.assign(1, 0);
+    while (!todo.empty()) {
+      const TreeCell<F>& source = tree.cells[todo.back()];
+      todo.pop_back();
+      const Vector3<F> d = source.centre - group.centre;
+      const F r_sq = d.squaredNorm();
+      const F both = source.radius + group.radius;
+      if (source.isLeaf() || r_sq > both * both) {
+        const F s = r_sq + (r_sq > both * both ? F(0) : F(both * both));
+        if (s > F(0)) {
+          sum += (source.mass / (s * sqrt(s))) * d;
+        }
+      } else {
+        for (std::uint32_t child = 0; child < source.children; ++child) {
+          todo.push_back(source.child + child);
+        }
+      }
+    }
+    return F(sum.norm());
+  }
+
+  void shareOut(BodyTree<S, F>& tree, const F& share, const F& least) {
+    using std::sqrt;
+    // First the sum of 1/a^2 over the bodies of each cell, in place of the weight.
+    for (TreeCell<F>& cell : tree.cells) {
+      cell.weight = F(0);
+    }
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      const F a = strength_[g] < least ? least : strength_[g];
+      TreeCell<F>& cell = tree.cells[groups_[g]];
+      cell.weight = a > F(0) ? F(F(static_cast<double>(cell.count())) / (a * a)) : F(0);
+    }
+    for (std::size_t c = tree.cells.size(); c-- > 0;) {
+      TreeCell<F>& cell = tree.cells[c];
+      if (isBelow_[c] == 0 && !(cell.isLeaf() || cell.count() <= groupSize)) {
+        for (std::uint32_t child = cell.child; child < cell.child + cell.children; ++child) {
+          cell.weight += tree.cells[child].weight;
+        }
+      }
+    }
+    for (TreeCell<F>& cell : tree.cells) {
+      if (cell.weight > F(0)) {
+        cell.weight = F(share / sqrt(F(cell.weight / F(static_cast<double>(cell.count())))));
+      }
+    }
+    for (std::size_t c = 0; c < tree.cells.size(); ++c) {
+      const TreeCell<F>& cell = tree.cells[c];
+      for (std::uint32_t child = cell.child; child < cell.child + cell.children; ++child) {
+        if (isBelow_[child] != 0) {
+          tree.cells[child].weight = cell.weight;
+        }
+      }
+    }
+  }
+
+  std::vector<std::uint32_t> groups_;
+  std::vector<std::uint8_t> isBelow_;
+  std::vector<F> strength_;
+};
+
+}  // namespace gravel::detail

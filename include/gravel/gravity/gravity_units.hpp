@@ -1,0 +1,108 @@
+#pragma once
+
+/// \file
+/// What every gravity sum does first: look at its input, and choose units in which nothing overflows.
+
+#include <gravel/core/check.hpp>
+
+#include <algorithm>
+
+namespace gravel::detail {
+
+/// Powers of two near the extent and the largest mass of a system, so that conversions are exact.
+template <Real S>
+class GravityUnits {
+ public:
+  GravityUnits() = default;
+
+  /// \throws std::invalid_argument for values that are not finite, negative masses or softening, and columns
+  /// of different lengths
+  template <class Positions, class Masses>
+  GravityUnits(const Positions& positions, const Masses& masses, const S& G, const S& softening) {
+    const std::size_t n = positions.size();
+    require("G", G, anyFinite<S>());
+    require("softening", softening, nonNegative<S>());
+    if (masses.size() != n) {
+      refuse("length of masses", std::to_string(masses.size()), "that of positions, " + std::to_string(n));
+    }
+    Vector3<S> low = Vector3<S>::Zero();
+    Vector3<S> high = Vector3<S>::Zero();
+    S heaviest(0);
+    for (std::size_t i = 0; i < n; ++i) {
+      const Vector3<S> half = positions[i] / S(2);  // the extent of two huge numbers is in range
+      const S m = masses[i];
+      if (!isFinite(half) || !isFinite(m) || m < S(0)) {
+        refuseBody(i, positions[i], m);
+      }
+      low = i == 0 ? half : low.cwiseMin(half);
+      high = i == 0 ? half : high.cwiseMax(half);
+      heaviest = std::max(heaviest, m);
+      sources_ += m > S(0) ? 1U : 0U;
+    }
+    const S extent = std::max(S((high - low).maxCoeff()), softening);
+    lengthExponent_ = exponentOf(extent);
+    massExponent_ = exponentOf(heaviest);
+    perLength_ = power(-lengthExponent_);
+    perMass_ = power(-massExponent_);
+  }
+
+  const S& perLength() const { return perLength_; }
+  const S& perMass() const { return perMass_; }
+  std::size_t sources() const { return sources_; }  ///< bodies with mass
+
+  /// x -> x G in the units of the caller, out of range only if the result is.
+  class Factor {
+   public:
+    Factor(const S& G, int exponent) : mantissa_(G), first_(1), second_(1) {
+      if constexpr (std::is_floating_point_v<S>) {
+        int own = 0;
+        mantissa_ = std::frexp(G, &own);
+        exponent += own;
+        first_ = std::ldexp(S(1), exponent / 2);
+        second_ = std::ldexp(S(1), exponent - exponent / 2);
+      }
+    }
+    S operator()(const S& x) const { return x * mantissa_ * first_ * second_; }
+
+   private:
+    S mantissa_, first_, second_;
+  };
+
+  Factor acceleration(const S& G) const { return Factor(G, massExponent_ - 2 * lengthExponent_); }
+  Factor energy(const S& G) const { return Factor(G, 2 * massExponent_ - lengthExponent_); }
+
+ private:
+  /// The power of two that brings x near 1; 0 for a scalar whose exponent cannot be had.
+  static int exponentOf(const S& x) {
+    if constexpr (std::is_floating_point_v<S>) {
+      constexpr int limit = std::numeric_limits<S>::max_exponent - 3;
+      return x > S(0) ? std::clamp(std::ilogb(x), -limit, limit) : 0;
+    } else {
+      return 0;
+    }
+  }
+
+  static S power(int exponent) {
+    if constexpr (std::is_floating_point_v<S>) {
+      return std::ldexp(S(1), exponent);
+    } else {
+      return S(1);
+    }
+  }
+
+  [[noreturn]] static void refuseBody(std::size_t i, const Vector3<S>& x, const S& m) {
+    const std::string who = " of body " + std::to_string(i) + " in a gravity sum";
+    if (!isFinite(x)) {
+      refuse("position" + who, formatVector(x), "finite");
+    }
+    refuse("mass" + who, formatReal(m), "finite, >= 0");
+  }
+
+  int lengthExponent_ = 0;
+  int massExponent_ = 0;
+  S perLength_ = S(1);
+  S perMass_ = S(1);
+  std::size_t sources_ = 0;
+};
+
+}  // namespace gravel::detail

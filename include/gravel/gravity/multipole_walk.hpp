@@ -1,0 +1,207 @@
+#pragma once
+
+/// \file
+/// The walk of the fast multipole method: what each cell of sinks does with each cell of sources.
+
+#include <gravel/gravity/far_field.hpp>
+
+namespace gravel::detail {
+
+/// When a walk takes a pair of cells as it is.
+struct WalkLimits {
+  int order = 4;
+  std::uint64_t pairsBelowExpansion = 64;  ///< fewer pairs of bodies are summed one by one
+  std::uint64_t pairsBelowSplit = 256;     ///< and fewer than that if the cells are too near
+};
+
+/// Work done, in units of its own.
+struct WalkCount {
+  std::size_t expansions = 0;  ///< pairs of cells, one direction
+  std::size_t pairs = 0;       ///< pairs of bodies, one direction
+  std::size_t tests = 0;
+
+  WalkCount& operator+=(const WalkCount& other) {
+    expansions += other.expansions;
+    pairs += other.pairs;
+    tests += other.tests;
+    return *this;
+  }
+};
+
+/// Descends through the cells as sinks, depth first. A cell meets the sources that were too near for its
+/// parent: it takes the expansion of those far away, sums those of few bodies one by one, opens those that
+/// are larger than itself, and leaves the rest to its children. Each direction of a pair of cells is decided
+/// by a function that is symmetric in them and is then computed by itself, so that sinks share nothing.
+template <Real S, Real F, class Terms>
+class MultipoleWalk {
+ public:
+  using Tree = BodyTree<S, F>;
+  using Moments = TreeMoments<S, F, Terms>;
+
+  MultipoleWalk(const Tree& tree, const Moments& moments, const WalkLimits& limits, const S& softening_sq,
+                SinkFields<S>& out)
+      : tree_(tree),
+        limits_(limits),
+        softening_sq_(softening_sq),
+        out_(out),
+        far_(tree, moments, limits.order, out.potential.empty() ? 1 : 0, softening_sq) {}
+
+  /// Where a walk can be taken up again: a cell, its parent's local expansion and the sources it has to meet.
+  struct Start {
+    std::uint32_t cell = 0;
+    std::uint32_t parent = 0;
+    std::vector<F> local;
+    std::vector<std::uint32_t> sources;
+  };
+
+  /// Descends to cells of at most `bodies` bodies and returns these as starts.
+  std::vector<Start> prepare(std::uint32_t bodies) {
+    std::vector<Start> starts;
+    prepared_ = &starts;
+    handOver_ = bodies;
+    stack_.assign(1, 0);
+    descend(0, 0, 0, 1, 0);
+    prepared_ = nullptr;
+    return starts;
+  }
+
+  void run(const Start& start) {
+    stack_ = start.sources;
+    locals_ = start.local;
+    descend(start.cell, start.parent, 0, stack_.size(), start.local.empty() ? 0 : 1);
+  }
+
+  const WalkCount& count() const { return count_; }
+
+ private:
+  using Cell = TreeCell<F>;
+
+  void descend(std::uint32_t c, std::uint32_t parent, std::size_t begin, std::size_t end, std::size_t level) {
+    const Cell& cell = tree_.cells[c];
+    if (prepared_ != nullptr && (cell.count() <= handOver_ || cell.isLeaf())) {
+      Start start{c, parent, {}, {}};
+      start.sources.assign(at(stack_, begin), at(stack_, end));
+      if (level > 0) {
+        start.local.assign(at(locals_, (level - 1) * far_.terms()), at(locals_, level * far_.terms()));
+      }
+      prepared_->push_back(std::move(start));
+      return;
+    }
+    inherit(cell, tree_.cells[parent], level);
+    const std::size_t kept = stack_.size();
+    far_.begin();
+    near_.clear();
+    for (std::size_t i = begin; i < end; ++i) {
+      todo_.push_back(stack_[i]);
+      while (!todo_.empty()) {
+        const std::uint32_t source = todo_.back();
+        todo_.pop_back();
+        meet(c, source);
+      }
+    }
+    far_.finish(cell, &locals_[level * far_.terms()]);
+    near_.apply(tree_, cell.first, cell.last, softening_sq_, out_);
+    count_.pairs += near_.size() * cell.count();
+    if (cell.isLeaf()) {
+      far_.evaluate(cell, &locals_[level * far_.terms()], out_);
+    } else {
+      const std::size_t keptEnd = stack_.size();
+      for (std::uint32_t child = cell.child; child < cell.child + cell.children; ++child) {
+        descend(child, c, kept, keptEnd, level + 1);
+      }
+    }
+    stack_.resize(kept);
+  }
+
+  template <class Vector>
+  static auto at(Vector& v, std::size_t i) {
+    return v.begin() + static_cast<std::ptrdiff_t>(i);
+  }
+
+  /// The cell's local expansion starts as its parent's.
+  void inherit(const Cell& cell, const Cell& parent, std::size_t level) {
+    if (locals_.size() < (level + 1) * far_.terms()) {
+      locals_.resize((level + 1) * far_.terms());
+    }
+    std::fill(at(locals_, level * far_.terms()), at(locals_, (level + 1) * far_.terms()), F(0));
+    if (level > 0) {
+      far_.shift(parent, &locals_[(level - 1) * far_.terms()], cell, &locals_[level * far_.terms()]);
+    }
+  }
+
+  void meet(std::uint32_t c, std::uint32_t s) {
+    const Cell& sink = tree_.cells[c];
+    const Cell& source = tree_.cells[s];
+    if (!(source.mass > F(0))) {
+      return;
+    }
+    if (c == s) {
+      if (sink.isLeaf()) {
+        near_.addWithin(tree_, sink.first, sink.last, softening_sq_, out_);
+      } else {
+        for (std::uint32_t child = 0; child < sink.children; ++child) {
+          stack_.push_back(sink.child + child);
+        }
+      }
+      return;
+    }
+    ++count_.tests;
+    const std::uint64_t pairs = std::uint64_t(sink.count()) * source.count();
+    if (pairs <= limits_.pairsBelowExpansion) {
+      near_.addSources(tree_, source.first, source.last);
+    } else if (c < s ? isFar(sink, source) : isFar(source, sink)) {
+      far_.add(sink, s);
+      ++count_.expansions;
+    } else if (pairs <= limits_.pairsBelowSplit || (sink.isLeaf() && source.isLeaf())) {
+      near_.addSources(tree_, source.first, source.last);
+    } else if (splitsFirst(c, sink, s, source)) {
+      stack_.push_back(s);
+    } else {
+      for (std::uint32_t child = 0; child < source.children; ++child) {
+        todo_.push_back(source.child + child);
+      }
+    }
+  }
+
+  static bool splitsFirst(std::uint32_t a, const Cell& cellA, std::uint32_t b, const Cell& cellB) {
+    if (cellA.isLeaf() || cellB.isLeaf()) {
+      return cellB.isLeaf();
+    }
+    return cellA.radius == cellB.radius ? a < b : cellA.radius > cellB.radius;
+  }
+
+  bool isFar(const Cell& a, const Cell& b) const {
+    const F r_sq = (a.centre - b.centre).squaredNorm();
+    const F both = a.radius + b.radius;
+    const F gap = r_sq - both * both;
+    return gap > F(0) && isAccurate(a, b, r_sq, gap) && isAccurate(b, a, r_sq, gap);
+  }
+
+  /// (M / r^2) ((s + R) / r)^p / (1 - theta^2)^2 within the sink's allowance: s the radius of the source's
+  /// mass, R that of the sink.
+  bool isAccurate(const Cell& source, const Cell& sink, const F& r_sq, const F& gap) const {
+    const F reach = source.spread + sink.radius;
+    const F ratio_sq = reach * reach / r_sq;
+    F error = source.mass * r_sq / (gap * gap);
+    error *= error;
+    for (int k = 0; k < limits_.order; ++k) {
+      error *= ratio_sq;
+    }
+    return error <= sink.weight * sink.weight;
+  }
+
+  const Tree& tree_;
+  WalkLimits limits_;
+  S softening_sq_;
+  SinkFields<S>& out_;
+  std::vector<std::uint32_t> stack_;  ///< sources that cells on the path have left to their children
+  std::vector<std::uint32_t> todo_;
+  std::vector<F> locals_;  ///< by level of the path
+  FarField<S, F, Terms> far_;
+  NearField<S> near_;
+  std::vector<Start>* prepared_ = nullptr;
+  std::uint32_t handOver_ = 0;
+  WalkCount count_;
+};
+
+}  // namespace gravel::detail

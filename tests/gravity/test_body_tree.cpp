@@ -1,0 +1,152 @@
+#include "support/catch.hpp"
+#include "support/gravity_scenes.hpp"
+#include <gravel/gravity/field_strength.hpp>
+#include <gravel/gravity/tree_moments.hpp>
+
+using namespace gravel;
+using namespace gravel::test;
+using Tree = gravel::detail::BodyTree<double, double>;
+
+namespace {
+
+Tree treeOf(const PointMasses<double>& points, std::uint32_t leafSize) {
+  Tree tree;
+  tree.resize(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    tree.x[i] = points.positions[i][0];
+    tree.y[i] = points.positions[i][1];
+    tree.z[i] = points.positions[i][2];
+    tree.m[i] = points.masses[i];
+    tree.body[i] = static_cast<std::uint32_t>(i);
+  }
+  tree.build(leafSize);
+  return tree;
+}
+
+/// Every body once; children tile their parent; groups hold no parent and child.
+void checkShape(const Tree& tree, const PointMasses<double>& points) {
+  std::vector<int> seen(points.size(), 0);
+  for (std::size_t row = 0; row < tree.size(); ++row) {
+    const std::uint32_t i = tree.body[row];
+    ++seen[i];
+    REQUIRE(points.positions[i] == Vector3<double>(tree.x[row], tree.y[row], tree.z[row]));
+    REQUIRE(points.masses[i] == tree.m[row]);
+  }
+  REQUIRE(seen == std::vector<int>(points.size(), 1));
+  REQUIRE(tree.levels.back() == tree.cells.size());
+  std::size_t group = 0;
+  for (std::size_t c = 0; c < tree.cells.size(); ++c) {
+    while (tree.levels[group + 1] <= c) {
+      ++group;
+    }
+    const auto& cell = tree.cells[c];
+    if (!cell.isLeaf()) {
+      REQUIRE(cell.child >= tree.levels[group + 1]);
+      std::uint32_t at = cell.first;
+      for (std::uint32_t child = cell.child; child < cell.child + cell.children; ++child) {
+        REQUIRE(tree.cells[child].first == at);
+        REQUIRE(tree.cells[child].count() > 0);
+        at = tree.cells[child].last;
+      }
+      REQUIRE(at == cell.last);
+      REQUIRE(cell.children > 1);
+    }
+  }
+}
+
+}  // namespace
+
+TEST_CASE("cells tile the bodies, in every scene, and leaves are small") {
+  for (const char* name : gravityScenes) {
+    const auto points = gravityScene<double>(name, 3000);
+    const Tree tree = treeOf(points, 16);
+    CAPTURE(name);
+    checkShape(tree, points);
+    for (const auto& cell : tree.cells) {
+      if (cell.isLeaf()) {
+        CHECK(cell.count() <= 16);
+      }
+    }
+  }
+}
+
+TEST_CASE("two clusters a million radii apart are each divided to the end") {
+  auto points = randomMasses<double>(1000, 95, 1e-6);
+  for (std::size_t i = 0; i < 500; ++i) {
+    points.positions[i][0] += 1.0;
+  }
+  const Tree tree = treeOf(points, 16);
+  checkShape(tree, points);
+  for (const auto& cell : tree.cells) {
+    CHECK((!cell.isLeaf() || cell.count() <= 16));
+  }
+}
+
+TEST_CASE("bodies at one place stay in one leaf") {
+  PointMasses<double> points{std::vector<Vector3<double>>(100, Vector3<double>(1, 2, 3)),
+                             std::vector<double>(100, 1.0)};
+  checkShape(treeOf(points, 16), points);
+  CHECK(treeOf(points, 16).cells.size() == 1);
+  points.positions.push_back({4, 4, 4});
+  points.masses.push_back(1.0);
+  const Tree tree = treeOf(points, 16);
+  checkShape(tree, points);
+  CHECK(tree.cells.size() == 3);
+}
+
+TEST_CASE("centres, radii and moments of cells are those of their bodies") {
+  const auto points = gravityScene<double>("rubble pile", 2000);
+  Tree tree = treeOf(points, 16);
+  gravel::detail::TreeMoments<double, double, gravel::detail::HarmonicTerms> moments;
+  const int order = 5;
+  moments.compute(tree, order);
+  using X = gravel::detail::Expansion<gravel::detail::HarmonicTerms>;
+  std::vector<double> q(moments.terms());
+  for (std::size_t c = 0; c < tree.cells.size(); ++c) {
+    const auto& cell = tree.cells[c];
+    std::vector<double> sum(q.size(), 0.0);
+    double mass = 0;
+    double radius = 0;
+    for (std::uint32_t i = cell.first; i < cell.last; ++i) {
+      const Vector3<double> s = cell.centre - Vector3<double>(tree.x[i], tree.y[i], tree.z[i]);
+      X::regular(order, s[0], s[1], s[2], q.data());
+      for (std::size_t k = 0; k < q.size(); ++k) {
+        sum[k] += tree.m[i] * q[k];
+      }
+      mass += tree.m[i];
+      radius = std::max(radius, s.norm());
+    }
+    CHECK_THAT(cell.mass, WithinRel(mass, 1e-13));
+    CHECK_THAT(cell.radius, WithinAbs(radius, 1e-14));
+    CHECK(cell.spread <= cell.radius * (1 + 1e-14));
+    for (std::size_t k = 0; k < q.size(); ++k) {
+      REQUIRE_THAT(moments.of(c)[k], WithinAbs(sum[k], 1e-14 * mass));  // all lengths are below 1
+    }
+    for (std::size_t k = 1; k < 4; ++k) {
+      CHECK_THAT(moments.of(c)[k], WithinAbs(0.0, 1e-15 * mass * 2));  // about the centre of mass
+    }
+  }
+}
+
+TEST_CASE("the first look at the field is right within a factor of three for most bodies") {
+  for (const char* name : gravityScenes) {
+    const auto points = gravityScene<double>(name, 1500);
+    Tree tree = treeOf(points, 16);
+    gravel::detail::TreeMoments<double, double, gravel::detail::HarmonicTerms> moments;
+    moments.compute(tree, 2);
+    gravel::detail::FieldStrength<double, double> strength;
+    strength.compute(tree, 1.0);
+    const GravityOracle oracle = bruteGravity(points.positions, points.masses, 1.0, 0.0);
+    std::size_t close = 0;
+    for (const auto& cell : tree.cells) {
+      if (cell.isLeaf()) {
+        for (std::uint32_t i = cell.first; i < cell.last; ++i) {
+          const auto a = static_cast<double>(oracle.accelerations[tree.body[i]].norm());
+          close += cell.weight > a / 3 && cell.weight < 3 * a ? 1U : 0U;
+        }
+      }
+    }
+    CAPTURE(name, close);
+    CHECK(close > 750);  // in a thin patch the nearest neighbours of a body pull more than the rest
+  }
+}
