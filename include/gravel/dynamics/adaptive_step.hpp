@@ -9,9 +9,8 @@
 ///   tau_i = sqrt(v^2 + a l_i) / a        the turning time v/a; sqrt(l/a) where a body starts from rest
 /// with l_i = its radius, or the softening, or a hundredth of the mean spacing, whichever is largest. The
 /// step is h = eta min(tau_i); and no sphere moves by more than a quarter of its radius in a step, so that
-/// contacts are met before they are deep. (Planets are points at the scale of their orbits: take a fixed step
-/// there, or radius 0.) The step follows the state at its start, so that a long orbit drifts in energy
-/// slowly; a fixed step does not.
+/// contacts are met before they are deep. The rule for bodies under forces whose law is not known; under
+/// mutual gravity see encounter_step.hpp.
 
 #include <gravel/bodies/bodies.hpp>
 #include <gravel/core/parallel.hpp>

@@ -7,6 +7,7 @@
 #include <gravel/contact/graph_coloring.hpp>
 #include <gravel/dynamics/adaptive_step.hpp>
 #include <gravel/dynamics/damping.hpp>
+#include <gravel/dynamics/encounter_step.hpp>
 #include <gravel/fwd.hpp>
 #include <gravel/output/conserved.hpp>
 #include <gravel/output/contact_virial.hpp>
@@ -220,6 +221,7 @@ class Space : public Settings<Scalar> {
   Callback<void(const char*)> log_;
 
   Scalar dt_ = Scalar(0);
+  bool stepGoesOn_ = false;  // the last step was smooth: the next one is chosen by it, reversibly
   Scalar previous_dt_ = Scalar(0);
   Scalar time_ = Scalar(0);
   Scalar timeRest_ = Scalar(0);  // what time_ lost to rounding (Kahan 1965)

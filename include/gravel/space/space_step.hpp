@@ -115,6 +115,7 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration) {
   timeRest_ = (h + timeRest_) - (sum - time_);
   time_ = sum;
   ++steps_;
+  stepGoesOn_ = contactCount() == 0;
   updateAdaptiveTimeStep();
   logSystemEnergy(iteration);
 }
@@ -131,6 +132,7 @@ void Space<Scalar, Layout>::prepare() {
     buildCollisionGraph();
     rememberPlaces();
     hookPower_ = force_.hookPower(bodies_);
+    stepGoesOn_ = false;
     updateAdaptiveTimeStep();
   }
 }
@@ -213,7 +215,18 @@ void Space<Scalar, Layout>::updateAdaptiveTimeStep() {
     return;
   }
   const StepLimits<Scalar> limits{c.timeStepFactor, c.minTimeStep, c.timeStep};
-  dt_ = stepFromMotion(bodies_, c.softening, limits, !contact_.boundaries.empty());
+  Scalar wanted = limits.largest;
+  const bool pulls = !(getG() == Scalar(0)) && n() > 1;
+  // Something at rest outside, or a force whose law is not known, counts by the motion of single bodies.
+  if (!pulls || force_.hook || !contact_.boundaries.empty()) {
+    wanted = stepFromMotion(bodies_, c.softening, limits, !contact_.boundaries.empty());
+  }
+  if (pulls) {
+    wanted = std::min<Scalar>(wanted, stepFromEncounters(bodies_, getG(), c.softening, limits));
+  }
+  // A blow, or a change from outside, ends one smooth motion and begins another.
+  dt_ =
+      stepGoesOn_ ? std::clamp<Scalar>(reversibleStep(dt_, wanted), limits.smallest, limits.largest) : wanted;
 }
 
 template <Real Scalar, class Layout>

@@ -1,0 +1,172 @@
+#pragma once
+
+/// \file
+/// The next step from pairs of bodies, and steps that run backwards as they ran forwards.
+///
+/// For a pair at distance r with relative speed v the rates of free fall and of flying by are
+///   b = sqrt(G (m1 + m2)/r^3),   a = v/r
+/// and its motion asks for the rate (b^4 (a^4 + b^4)/2)^(1/8): b on a circular orbit, sqrt(a b) up to a
+/// constant for a fast pass, which gravity hardly bends, nothing where there is no gravity. The pairs' rates
+/// and the longest step are added in their eighth powers, which is close to the largest of them, and smooth:
+///   h = h_max / (1 + sum over pairs (h_max rate / eta)^8)^(1/8)
+/// All of it is even in the velocities, depends on differences alone, and does not notice a body's passing
+/// through a point of zero acceleration.
+
+#include <gravel/dynamics/adaptive_step.hpp>
+
+namespace gravel {
+
+/// Most bodies for which all pairs are looked at. Above, each body is taken with its likeliest partner: one
+/// of mean mass, at the distance at which it alone would cause the body's acceleration, but not closer than
+/// touching.
+inline constexpr std::size_t encounterPairs = 128;
+
+namespace detail {
+
+/// The rates are 8th powers: beyond a float's range.
+template <Real Scalar>
+using RateScalar = std::conditional_t<std::is_same_v<Scalar, float>, double, Scalar>;
+
+template <class S>
+S eighthRoot(const S& x) {
+  using std::sqrt;
+  return sqrt(S(sqrt(S(sqrt(x)))));
+}
+
+/// All bodies in columns.
+template <class S>
+class EncounterTable {
+ public:
+  using Column = Eigen::Array<S, Eigen::Dynamic, 1, 0, static_cast<int>(encounterPairs), 1>;
+
+  template <class BodiesType>
+  explicit EncounterTable(const BodiesType& bodies) : n_(static_cast<Eigen::Index>(bodies.size())) {
+    for (Column* c : {&x_, &y_, &z_, &u_, &v_, &w_, &m_, &r_}) {
+      c->resize(n_);
+    }
+    for (Eigen::Index i = 0; i < n_; ++i) {
+      const auto body = bodies[static_cast<std::size_t>(i)];
+      const Vector3<S> x = body.position().template cast<S>();
+      const Vector3<S> v = body.velocity().template cast<S>();
+      x_[i] = x[0], y_[i] = x[1], z_[i] = x[2];
+      u_[i] = v[0], v_[i] = v[1], w_[i] = v[2];
+      m_[i] = S(body.mass());
+      r_[i] = S(body.radius());
+      spheres_ = spheres_ || r_[i] > S(0);
+    }
+  }
+
+  /// Sums (rate T)^8 over the pairs, and finds the largest (T speed)^2 / (gap + radius/4)^2, where the radius
+  /// is the smaller of the two, or that of the only sphere.
+  void look(const S& G, const S& softening, const S& T, S& sum, S& approach) const {
+    using std::sqrt;
+    const S T_sq = T * T;
+    Column s, speed_sq, a, b;
+    for (Eigen::Index i = 0; i + 1 < n_; ++i) {
+      const Eigen::Index k = n_ - i - 1;
+      s = (x_.tail(k) - x_[i]).square() + (y_.tail(k) - y_[i]).square() + (z_.tail(k) - z_[i]).square();
+      speed_sq =
+          (u_.tail(k) - u_[i]).square() + (v_.tail(k) - v_[i]).square() + (w_.tail(k) - w_[i]).square();
+      if (spheres_) {
+        a = r_.tail(k).min(r_[i]);
+        a = (a > S(0)).select(a, r_.tail(k) + r_[i]) / S(4);
+        a += (s.sqrt() - (r_.tail(k) + r_[i])).max(S(0));
+        b = (a > S(0)).select(speed_sq * T_sq / (a * a), Column::Constant(k, S(0)));
+        approach = std::max<S>(approach, b.maxCoeff());
+        s = s.max((r_.tail(k) + r_[i]).square());  // nothing gets closer than touching
+      }
+      s = (s + softening * softening).max(S(1e-60)).inverse();
+      a = speed_sq * s * T_sq;
+      b = ((m_.tail(k) + m_[i]) * (G * T_sq)).square() * (s * s * s);
+      sum += (b * (a * a + b)).sum() / S(2);
+    }
+  }
+
+ private:
+  Eigen::Index n_;
+  Column x_, y_, z_, u_, v_, w_, m_, r_;
+  bool spheres_ = false;
+};
+
+/// The largest (rate T)^8 of a body with its likeliest partner, and the largest (T speed)^2 / (radius/4)^2.
+/// O(N).
+template <class S, Real Scalar, class Layout>
+void lookAtLikeliest(const Bodies<Scalar, Layout>& bodies, const S& G, const S& softening, const S& T, S& sum,
+                     S& approach) {
+  const std::size_t n = bodies.size();
+  S mass(0);
+  Vector3<S> v_cm = Vector3<S>::Zero();
+  Vector3<S> a_cm = Vector3<S>::Zero();
+  for (std::size_t i = 0; i < n; ++i) {
+    const S m = S(bodies.masses()[i]);
+    mass += m;
+    v_cm += bodies.velocities()[i].template cast<S>() * m;
+    a_cm += bodies.accelerations()[i].template cast<S>() * m;
+  }
+  if (mass > S(0)) {
+    v_cm /= mass;
+    a_cm /= mass;
+  }
+  const auto speedSq = [&](std::size_t i) {
+    return S(Vector3<S>(bodies.velocities()[i].template cast<S>() - v_cm).squaredNorm() * T * T);
+  };
+  const S Gm = G * mass / S(static_cast<double>(n)) * T * T;
+  sum = -orderedMin(n, 2048, S(0), [&](std::size_t i) {
+    const auto body = bodies[i];
+    const S a = Vector3<S>(body.acceleration().template cast<S>() - a_cm).norm() * T * T;
+    if (body.isFixed() || !(a > S(0))) {
+      return S(0);
+    }
+    const S touching = S(2) * S(body.radius());
+    const S s = S(1) / (Gm / a + touching * touching + softening * softening);
+    const S fly = speedSq(i) * s;
+    const S fall = Gm * Gm * s * s * s;
+    return S(-fall * (fly * fly + fall) / S(2));
+  });
+  approach = -orderedMin(n, 2048, S(0), [&](std::size_t i) {
+    const S r = S(bodies.radii()[i]);
+    return r > S(0) && !bodies[i].isFixed() ? S(-S(16) * speedSq(i) / (r * r)) : S(0);
+  });
+}
+
+}  // namespace detail
+
+/// The step by the rules above, within the limits and not below 1e-12 of the longest. Up to `encounterPairs`
+/// bodies O(N^2), about as dear as their gravity, and also no pair meets deeper than a quarter of the smaller
+/// radius in a step; above O(N), and no sphere moves by more than a quarter of its radius (see
+/// `stepFromMotion`).
+template <Real Scalar, class Layout>
+Scalar stepFromEncounters(const Bodies<Scalar, Layout>& bodies, const Scalar& G, const Scalar& softening,
+                          const StepLimits<Scalar>& limits) {
+  using S = detail::RateScalar<Scalar>;
+  using std::sqrt;
+  const S T = S(limits.largest) / S(limits.factor);
+  S sum(0);
+  S approach(0);
+  if (bodies.size() <= encounterPairs) {
+    detail::EncounterTable<S>(bodies).look(S(G), S(softening), T, sum, approach);
+  } else {
+    detail::lookAtLikeliest<S>(bodies, S(G), S(softening), T, sum, approach);
+  }
+  S h = S(limits.largest) / detail::eighthRoot(S(S(1) + sum));
+  if (approach > S(0)) {
+    h = std::min<S>(h, T / sqrt(approach));
+  }
+  return std::clamp<Scalar>(Scalar(h), std::max<Scalar>(limits.smallest, limits.largest * Scalar(1e-12)),
+                            limits.largest);
+}
+
+/// The step after one of length `last`, where the state between them asks for `wanted`: the two steps' mean
+/// rate is the rate wanted, 1/next + 1/last = 2/wanted (Huang & Leimkuhler 1997, SIAM J. Sci. Comput. 18,
+/// 239). From the state after it, backwards, the same rule gives `last`: the map is as reversible as a fixed
+/// step, and its energy does not drift. Where `last` was far from `wanted`, it is `wanted`.
+template <Real Scalar>
+Scalar reversibleStep(const Scalar& last, const Scalar& wanted) {
+  // 2/3 … 2 of the step wanted, a range that the rule maps on itself.
+  if (!(Scalar(3) * last >= Scalar(2) * wanted) || !(last <= Scalar(2) * wanted)) {
+    return wanted;
+  }
+  return wanted * Scalar(last / (Scalar(2) * last - wanted));
+}
+
+}  // namespace gravel
