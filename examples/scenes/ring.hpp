@@ -4,8 +4,8 @@
 /// A patch of a planet's ring of equal, smooth spheres without gravity of their own, and what is measured of
 /// it. Units: radius 1, orbital frequency 1.
 
+#include "scenes/blows.hpp"
 #include "scenes/scenes.hpp"
-#include <gravel/gravel.hpp>
 
 namespace gravel::scenes {
 
@@ -22,7 +22,8 @@ inline double ringSide(const RingOptions& options) {
   return std::sqrt(static_cast<double>(options.count) * pi<double>() / options.opticalDepth);
 }
 
-/// The patch with its bodies on a jittered lattice, moving with the flow and 1 rms besides along each axis.
+/// The patch with its bodies on a jittered lattice, moving with the flow and 1 rms besides along each axis. On
+/// the mean they have no height, and no velocity but the flow's.
 inline Space<double> ringPatch(const RingOptions& options) {
   SimulationConfig<double> config;
   config.G = 0.0;
@@ -40,6 +41,9 @@ inline Space<double> ringPatch(const RingOptions& options) {
   const double gap = side / static_cast<double>(row);
   const std::size_t layers = (options.count + row * row - 1) / (row * row);
   Sequence random(options.seed);
+  std::vector<Body<double>> bodies;
+  Vector3<double> drift = Vector3<double>::Zero();
+  double height0 = 0.0;
   for (std::size_t i = 0; i < options.count; ++i) {
     Body<double> body;
     body.radius = 1.0;
@@ -50,7 +54,14 @@ inline Space<double> ringPatch(const RingOptions& options) {
     body.position = {along(i % row, row, gap), along(i / row % row, row, gap),
                      along(i / (row * row), layers, std::max(spacing, 2.2))};
     body.velocity = random.normalVector();
+    bodies.push_back(body);
+    drift += body.velocity / static_cast<double>(options.count);
+    height0 += body.position[2] / static_cast<double>(options.count);
+  }
+  for (Body<double>& body : bodies) {  // collisions would never damp an epicycle of the whole patch
+    body.velocity -= drift;
     body.velocity[1] -= 1.5 * body.position[0];
+    body.position[2] -= height0;
     space.addBody(body);
   }
   return space;
@@ -76,16 +87,12 @@ class RingStatistics {
       plane += std::max(0.0, r * r - z * z);
     }
     filling_ += pi<double>() * plane / (box[0] * box[1]);
-    const auto impulses = space.contactImpulses();
-    for (std::size_t k = 0; k < impulses.size(); ++k) {
-      if (impulses[k].normal > 0.0) {
-        const Contact<double>& c = space.contacts()[k];
-        hits_ += 1.0;
-        // Momentum along the orbit, carried outward over the distance of the centres.
-        flux_ += impulses[k].normal * c.normal[1] * (c.arm1 + c.arm2) * c.normal[0] /
-                 static_cast<double>(space.body(c.first).mass());
-      }
-    }
+    forEachBlow(space, [&](std::size_t first, std::size_t, const Vector3<double>& normal, double distance,
+                           double impulse) {
+      hits_ += 1.0;
+      // Momentum along the orbit, carried outward over the distance of the centres.
+      flux_ += impulse * normal[1] * distance * normal[0] / static_cast<double>(space.body(first).mass());
+    });
     time_ += space.getPreviousTimeStep();
   }
 

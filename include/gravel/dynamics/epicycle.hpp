@@ -152,6 +152,36 @@ void integrateEpicycle(const HillFrame<Scalar>& frame, Bodies<Scalar, Layout>& b
   detail::kickAndDrift(bodies, kick, Scalar(0), torques, none);
 }
 
+/// Brings bodies that left a periodic box back in through the other side. \return the energy that they have
+/// more there [J]: what the shear of a disc puts in
+template <Real Scalar, class Layout>
+Scalar wrapBodies(Bodies<Scalar, Layout>& bodies, const Domain<Scalar>& domain, const Scalar& time) {
+  if (domain.isOpen()) {
+    return Scalar(0);
+  }
+  const HillFrame<Scalar> frame(domain);
+  return orderedSum(bodies.size(), detail::bodyGrain, Scalar(0), [&](std::size_t begin, std::size_t end) {
+    Scalar gained(0);
+    for (std::size_t i = begin; i < end; ++i) {
+      const Vector3<Scalar> x0 = bodies[i].position();
+      const Vector3<Scalar> v0 = bodies[i].velocity();
+      Vector3<Scalar> x = x0;
+      Vector3<Scalar> v = v0;
+      domain.wrap(x, v, time);
+      if (x == x0) {
+        continue;
+      }
+      bodies[i].position() = x;
+      bodies[i].velocity() = v;
+      if (frame.turns()) {
+        gained += Scalar(bodies[i].mass()) * (Vector3<Scalar>(v - v0).dot(v + v0) / Scalar(2) +
+                                              (frame.potential(x) - frame.potential(x0)));
+      }
+    }
+    return gained;
+  });
+}
+
 /// Energy of the movable bodies in the frame's potential [J].
 template <Real Scalar, class Layout>
 Scalar frameEnergy(const Bodies<Scalar, Layout>& bodies, const HillFrame<Scalar>& frame) {

@@ -4,6 +4,7 @@
 /// The collision part of a step: candidates, contacts, overlap, impulses.
 
 #include <gravel/contact/boundary_list.hpp>
+#include <gravel/contact/collision_outcome.hpp>
 #include <gravel/contact/contact_solver.hpp>
 #include <gravel/contact/narrow_phase.hpp>
 #include <gravel/core/profiler.hpp>
@@ -26,38 +27,13 @@ class ContactStage {
   Domain<Scalar> domain;
   Boundaries<Scalar> boundaries;
   MaterialTable<Scalar> materials;
+  CollisionHook<Scalar> collisionHook;
 
   const std::vector<Contact<Scalar>>& contacts() const { return contacts_; }
   const ContactReport<Scalar>& report() const { return report_; }
 
-  /// Brings bodies that left a periodic box back in through the other side. \return the energy that they have
-  /// more there [J]: what the shear of a disc puts in
-  Scalar wrap(Bodies& bodies, const Scalar& time) const {
-    if (domain.isOpen()) {
-      return Scalar(0);
-    }
-    const HillFrame<Scalar> frame(domain);
-    return orderedSum(bodies.size(), detail::bodyGrain, Scalar(0), [&](std::size_t begin, std::size_t end) {
-      Scalar gained(0);
-      for (std::size_t i = begin; i < end; ++i) {
-        const Vector3<Scalar> x0 = bodies[i].position();
-        const Vector3<Scalar> v0 = bodies[i].velocity();
-        Vector3<Scalar> x = x0;
-        Vector3<Scalar> v = v0;
-        domain.wrap(x, v, time);
-        if (x == x0) {
-          continue;
-        }
-        bodies[i].position() = x;
-        bodies[i].velocity() = v;
-        if (frame.turns()) {
-          gained += Scalar(bodies[i].mass()) * (Vector3<Scalar>(v - v0).dot(v + v0) / Scalar(2) +
-                                                (frame.potential(x) - frame.potential(x0)));
-        }
-      }
-      return gained;
-    });
-  }
+  /// Brings bodies back into the domain. \return the energy that they have more there [J]
+  Scalar wrap(Bodies& bodies, const Scalar& time) const { return wrapBodies(bodies, domain, time); }
 
   /// Finds all contacts at the present positions, for steps of length h [s].
   void detect(const Bodies& bodies, const Config& config, const Scalar& time, const Scalar& h,
@@ -176,6 +152,13 @@ class ContactStage {
     report_.restitutionLoss += half.restitutionLoss;
     report_.frictionLoss += half.frictionLoss;
     report_.driftWork += half.driftWork;
+  }
+
+  /// Bodies are not those of the contacts any more.
+  void forgetContacts() {
+    contacts_.clear();
+    coloured_ = false;
+    moved_ = false;
   }
 
   /// A new step: its report starts empty.

@@ -95,6 +95,11 @@ class Space : public Settings<Scalar> {
   const Vector& uniformField() const { return force_.field; }
   /// The user's own force; an empty one takes it away again.
   void setForceHook(ForceHook<Scalar, Layout> hook);
+  /// The user's own outcome of each collision of two bodies: bounce, merge, or velocities of his own; an
+  /// empty one takes it away again. Two that merge become one at the end of the step (see `merged()`): of
+  /// them the fixed one keeps its id, else the heavier, else the one of the smaller id. The energy of motion
+  /// that is lost is booked as `restitution`, that of the potential as `exchange`.
+  void setCollisionHook(CollisionHook<Scalar> hook) { contact_.collisionHook = std::move(hook); }
   /// Open, periodic or shear-periodic. A shear-periodic one is a patch of a disc in Hill's frame: positions,
   /// velocities and spins are those in the frame, its potential is part of the potential energy, and the
   /// shear does its `work` where bodies or contacts cross an edge in x. \throws std::invalid_argument for a
@@ -157,11 +162,11 @@ class Space : public Settings<Scalar> {
   /// Where diagnostics go, a line a call; standard output by default.
   void setLog(Callback<void(const char*)> log) { log_ = std::move(log); }
 
-  /// Writes all that the next steps depend on, but for a force hook and the log.
+  /// Writes all that the next steps depend on, but for hooks and the log.
   /// \throws std::runtime_error if the file cannot be written
   void save(const std::string& path) const;
-  /// Takes up a saved run: the next steps give the bits that the saved space would have given. The force hook
-  /// and the log stay those of this space. \throws std::runtime_error, and this space stays as it was
+  /// Takes up a saved run: the next steps give the bits that the saved space would have given. Hooks and
+  /// the log stay those of this space. \throws std::runtime_error, and this space stays as it was
   void restore(const std::string& path);
 
   // Parts of the collision handling, as the step uses them.
@@ -207,6 +212,10 @@ class Space : public Settings<Scalar> {
   bool placesChanged() const;
   Material<Scalar> pairMaterial(const CollisionContext& ctx) const;
   Scalar bindingEnergy(std::size_t i) const;
+  std::vector<std::pair<BodyId, BodyId>> decideCollisions();
+  void mergeCollided(const std::vector<std::pair<BodyId, BodyId>>& merges);
+  void merge(BodyId stays, BodyId goes);
+  Scalar pairEnergy(std::size_t i, std::size_t j) const;
   Scalar potentialEnergy() const;
   template <class Change>
   void changePotential(Change&& change);
@@ -241,6 +250,7 @@ class Space : public Settings<Scalar> {
 
 }  // namespace gravel
 
+#include <gravel/space/space_collisions.hpp>
 #include <gravel/space/space_setup.hpp>
 #include <gravel/space/space_state.hpp>
 #include <gravel/space/space_step.hpp>

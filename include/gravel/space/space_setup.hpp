@@ -173,6 +173,16 @@ void Space<Scalar, Layout>::changePotential(Change&& change) {
   forcesValid_ = false;
 }
 
+/// Potential energy of a pair [J].
+template <Real Scalar, class Layout>
+Scalar Space<Scalar, Layout>::pairEnergy(std::size_t i, std::size_t j) const {
+  const Vector r_ij = Vector(bodies_[j].position()) - Vector(bodies_[i].position());
+  const Scalar s = r_ij.squaredNorm() + this->config_.softening * this->config_.softening;
+  return getG() == Scalar(0) ? Scalar(0)
+                             : Scalar(-getG() * Scalar(bodies_[i].mass()) * Scalar(bodies_[j].mass()) *
+                                      PairLaw<Scalar>::potentialFactor(s));
+}
+
 /// Kinetic energy of body i and its share of the potential: what leaves with it. O(N).
 template <Real Scalar, class Layout>
 Scalar Space<Scalar, Layout>::bindingEnergy(std::size_t i) const {
@@ -185,14 +195,8 @@ Scalar Space<Scalar, Layout>::bindingEnergy(std::size_t i) const {
   if (!one.isFixed()) {
     energy += m * (HillFrame<Scalar>(contact_.domain).potential(x) - force_.field.dot(x));
   }
-  if (!(getG() == Scalar(0)) && m > Scalar(0)) {
-    for (std::size_t j = 0; j < n(); ++j) {
-      if (j != i) {
-        const Vector r_ij = Vector(bodies_[j].position()) - x;
-        const Scalar s = r_ij.squaredNorm() + this->config_.softening * this->config_.softening;
-        energy -= getG() * m * Scalar(bodies_[j].mass()) * PairLaw<Scalar>::potentialFactor(s);
-      }
-    }
+  for (std::size_t j = 0; j < n() && !(getG() == Scalar(0)) && m > Scalar(0); ++j) {
+    energy += j == i ? Scalar(0) : pairEnergy(i, j);
   }
   return energy;
 }

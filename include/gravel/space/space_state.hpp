@@ -232,6 +232,7 @@ void Space<Scalar, Layout>::restore(const std::string& path) {
   lost_.setLostParts(bodies_, lost);
   orbits_ = std::move(orbits);
   this->config_ = config;
+  contact.collisionHook = std::move(contact_.collisionHook);
   contact_ = std::move(contact);
   force_.gravity.setKind(config.gravity);
   force_.gravity.setTolerance(config.gravityTolerance);

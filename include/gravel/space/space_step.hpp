@@ -99,10 +99,12 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration) {
       const Scalar power = force_.hookPower(bodies_);
       left_.work -= (hookPower_ + power) * h / Scalar(2);
     }
+    const std::vector<std::pair<BodyId, BodyId>> merges = decideCollisions();
     resolveCollisions();
     left_.restitution += contact_.report().restitutionLoss;
     left_.friction += contact_.report().frictionLoss;
     left_.work -= contact_.report().driftWork;
+    mergeCollided(merges);
     applyDamping();
     if (force_.hook) {
       hookPower_ = force_.hookPower(bodies_);

@@ -1,0 +1,78 @@
+#pragma once
+
+/// \file
+/// The user's outcomes of collisions that the solver of simultaneous contacts would deal.
+
+#include <gravel/contact/collision_outcome.hpp>
+#include <gravel/contact/contact.hpp>
+#include <gravel/contact/contact_bodies.hpp>
+
+#include <span>
+#include <utility>
+
+namespace gravel {
+
+template <Real Scalar>
+struct ContactOutcomes {
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> merges;  ///< ids, in the order of contacts
+  Scalar restitutionLoss = Scalar(0);                           ///< [J] of velocities that the user gave
+  Scalar frictionLoss = Scalar(0);                              ///< [J] of spins
+};
+
+/// Asks `hook` about each contact of two bodies that approach faster than what rests picks up in a step,
+/// `threshold` + 2 |a_rel.n| h, and gives them the velocities of its outcome. O(contacts), one thread.
+template <Real S, ContactBodies B>
+ContactOutcomes<S> decideContacts(std::span<const Contact<S>> contacts, B& bodies,
+                                  const CollisionHook<S>& hook, const S& time, const S& threshold,
+                                  const S& h) {
+  ContactOutcomes<S> outcomes;
+  const auto partner = [&](std::uint32_t i, std::uint64_t id) {
+    return typename Collision<S>::Partner{BodyId{id},
+                                          bodies.masses()[i],
+                                          bodies.radii()[i],
+                                          !detail::isMovable(bodies, i),
+                                          MaterialId{bodies.materials()[i]},
+                                          Vector3<S>(bodies.velocities()[i]),
+                                          Vector3<S>(bodies.angularVelocities()[i])};
+  };
+  const auto fall = [&](std::uint32_t i) {
+    return detail::isMovable(bodies, i) ? Vector3<S>(bodies.accelerations()[i])
+                                        : Vector3<S>(Vector3<S>::Zero());
+  };
+  for (const Contact<S>& c : contacts) {
+    if (c.second == staticPartner) {
+      continue;
+    }
+    const Vector3<S> v_rel =
+        Vector3<S>(bodies.velocities()[c.second]) + c.drift - Vector3<S>(bodies.velocities()[c.first]);
+    const S approach = -c.normal.dot(v_rel);
+    const S a_n = c.normal.dot(Vector3<S>(fall(c.second) - fall(c.first)));
+    if (!(approach > threshold + S(2) * (a_n < S(0) ? S(-a_n) : a_n) * h)) {
+      continue;
+    }
+    const Collision<S> hit{
+        time, partner(c.first, c.key1), partner(c.second, c.key2), c.normal, v_rel, c.material, approach};
+    const CollisionOutcome<S> outcome = hook(hit);
+    if (outcome.kind == CollisionKind::Merge) {
+      outcomes.merges.emplace_back(c.key1, c.key2);
+    } else if (outcome.kind == CollisionKind::Velocities) {
+      const auto give = [&](std::uint32_t i, const auto& side, const Vector3<S>& v, const Vector3<S>& w) {
+        if (side.fixed) {
+          return;
+        }
+        const S moment = S(bodies.inertiaFactors()[i]) * side.mass * side.radius * side.radius;
+        outcomes.restitutionLoss -=
+            side.mass * Vector3<S>(v - side.velocity).dot(Vector3<S>(v + side.velocity)) / S(2);
+        outcomes.frictionLoss -=
+            moment * Vector3<S>(w - side.angularVelocity).dot(Vector3<S>(w + side.angularVelocity)) / S(2);
+        bodies.velocities()[i] = v;
+        bodies.angularVelocities()[i] = w;
+      };
+      give(c.first, hit.first, outcome.velocity1, outcome.angularVelocity1);
+      give(c.second, hit.second, outcome.velocity2, outcome.angularVelocity2);
+    }
+  }
+  return outcomes;
+}
+
+}  // namespace gravel

@@ -1,0 +1,102 @@
+#pragma once
+
+/// \file
+/// Members of `Space` that carry out what a user decides of collisions.
+
+#include <gravel/contact/contact_outcomes.hpp>
+#include <gravel/space/space.hpp>
+
+#include <unordered_map>
+
+namespace gravel {
+
+/// Pairs that shall merge after this step: those of the impacts inside it in their order, then contacts at
+/// its end.
+template <Real Scalar, class Layout>
+auto Space<Scalar, Layout>::decideCollisions() -> std::vector<std::pair<BodyId, BodyId>> {
+  std::vector<std::pair<BodyId, BodyId>> merges;
+  if (!contact_.collisionHook) {
+    return merges;
+  }
+  const SimulationConfig<Scalar>& c = this->config_;
+  const ContactOutcomes<Scalar> ends = decideContacts<Scalar>(
+      contact_.contacts(), bodies_, contact_.collisionHook, Scalar(time_ + previous_dt_),
+      std::max(c.restitutionThreshold, c.epsilon), previous_dt_);
+  for (const auto& [id1, id2] : ends.merges) {
+    merges.emplace_back(BodyId{id1}, BodyId{id2});
+  }
+  left_.restitution += ends.restitutionLoss;
+  left_.friction += ends.frictionLoss;
+  return merges;
+}
+
+/// One after the other. Of two, the fixed one stays, else the heavier, else the one of the smaller id; a
+/// third that meets the one that went meets the one that stayed.
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::mergeCollided(const std::vector<std::pair<BodyId, BodyId>>& merges) {
+  if (merges.empty()) {
+    return;
+  }
+  std::unordered_map<std::uint64_t, BodyId> heir;
+  const auto present = [&](BodyId id) {
+    for (auto next = heir.find(toInteger(id)); next != heir.end(); next = heir.find(toInteger(id))) {
+      id = next->second;
+    }
+    return id;
+  };
+  for (const auto& [id1, id2] : merges) {
+    BodyId stays = present(id1);
+    BodyId goes = present(id2);
+    if (stays == goes) {
+      continue;
+    }
+    const auto comesFirst = [&](BodyId a, BodyId b) {
+      const BodyProxy x = body(a);
+      const BodyProxy y = body(b);
+      if (x.isFixed() != y.isFixed()) {
+        return x.isFixed();
+      }
+      return x.mass() != y.mass() ? x.mass() > y.mass() : toInteger(a) < toInteger(b);
+    };
+    if (!comesFirst(stays, goes)) {
+      std::swap(stays, goes);
+    }
+    heir.emplace(toInteger(goes), stays);
+    merge(stays, goes);
+  }
+  contact_.forgetContacts();
+  forcesValid_ = false;
+}
+
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::merge(BodyId stays, BodyId goes) {
+  const std::size_t i = bodies_.indexOf(stays);
+  const std::size_t j = bodies_.indexOf(goes);
+  const auto motionOf = [&](std::size_t k) {
+    const BodyProxy one = bodies_[k];
+    return (Scalar(one.mass()) * Scalar(one.velocity().squaredNorm()) +
+            one.inertia() * Scalar(one.angularVelocity().squaredNorm())) /
+           Scalar(2);
+  };
+  const Body<Scalar> a = bodies_[i].load();
+  const Body<Scalar> b = bodies_[j].load();
+  Vector r_ab = b.position - a.position;
+  Vector v_ab = b.velocity - a.velocity;
+  contact_.domain.minimumImage(r_ab, v_ab, Scalar(time_ + previous_dt_));
+  const Scalar motion = motionOf(i) + motionOf(j);
+  const Scalar energy = bindingEnergy(i) + bindingEnergy(j) - pairEnergy(i, j);
+  const Vector pull = Vector(bodies_[i].force()) + Vector(bodies_[j].force());
+  const Body<Scalar> one = merged(a, b, r_ab, v_ab);
+  bodies_[i].store(one);
+  if (!one.fixed) {
+    bodies_[i].force() = pull;
+    bodies_[i].acceleration() = pull / one.mass;
+  }
+  bodies_.remove(goes);
+  const std::size_t now = bodies_.indexOf(stays);
+  const Scalar lost = motion - motionOf(now);
+  left_.restitution += lost;
+  left_.exchange += energy - bindingEnergy(now) - lost;  // of the potential
+}
+
+}  // namespace gravel
