@@ -9,7 +9,7 @@ using namespace gravel::test;
 namespace {
 
 /// Methods that move points only.
-constexpr IntegratorKind orbital[] = {IntegratorKind::GaussRadau15};
+constexpr IntegratorKind orbital[] = {IntegratorKind::GaussRadau15, IntegratorKind::WisdomHolman};
 
 template <class S = double, class Layout = SoA>
 Space<S, Layout> planets(IntegratorKind kind, bool adaptive) {
@@ -79,13 +79,15 @@ TEST_CASE("Steps end where they are asked to, whatever the method takes inside")
       const double start = energyOf(space);
       space.advanceTo(20001.0);
       CHECK(space.time() == 20001.0);
-      CHECK_THAT(energyOf(space), WithinRel(start, 1e-14));
+      // Wisdom-Holman in steps of an eleventh of Jupiter's orbit; the other is right to rounding.
+      CHECK_THAT(energyOf(space), WithinRel(start, kind == IntegratorKind::GaussRadau15 ? 1e-14 : 1e-5));
       Space<double> other = planets(kind, adaptive);
       for (int i = 1; i <= 3; ++i) {
         other.advanceTo(6667.0 * i);
       }
       // Different steps: rounding, carried on by an orbit of 4.6 turns.
-      CHECK(difference(stateOf(space), stateOf(other)) < 1e-13);
+      CHECK(difference(stateOf(space), stateOf(other)) <
+            (kind == IntegratorKind::GaussRadau15 ? 1e-13 : 1e-3));
       CHECK(space.energyLedger().dissipated() == 0.0);
     }
   }
@@ -110,7 +112,8 @@ TEMPLATE_TEST_CASE("Orbits saved and taken up go on bit for bit", "", (std::pair
   using S = typename TestType::first_type;
   using Layout = typename TestType::second_type;
   const TemporaryFile file("orbits");
-  for (const IntegratorKind kind : {IntegratorKind::GaussRadau15, IntegratorKind::KahanLi8}) {
+  for (const IntegratorKind kind :
+       {IntegratorKind::GaussRadau15, IntegratorKind::WisdomHolman, IntegratorKind::KahanLi8}) {
     for (const bool adaptive : {false, true}) {
       auto whole = planets<S, Layout>(kind, adaptive);
       advance(whole, 60);

@@ -34,6 +34,9 @@ enum class IntegratorKind : std::uint8_t {
   SymplecticEpicycle,
   /// order 15, steps of its own choice, to rounding (dynamics/gauss_radau.hpp); bodies must be points
   GaussRadau15,
+  /// order 2 in Jacobi's coordinates, 1 evaluation; planets about a heavy centre, points
+  /// (dynamics/wisdom_holman.hpp)
+  WisdomHolman,
 };
 
 /// One kick, one drift and the force evaluation after it.
@@ -176,6 +179,8 @@ inline constexpr IntegratorTraits traitsOf(IntegratorKind kind) {
       return row("ForceGradient4", 4, detail::forceGradient4Stages, false);
     case IntegratorKind::GaussRadau15:
       return {"GaussRadau15", 15, 0, false, false, false, {}, 0};
+    case IntegratorKind::WisdomHolman:
+      return {"WisdomHolman", 2, 1, true, true, false, {}, 0};
     case IntegratorKind::SymplecticEpicycle:
       return row("SymplecticEpicycle", 2, detail::verletStages);
     case IntegratorKind::VelocityVerlet:

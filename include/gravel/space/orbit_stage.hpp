@@ -5,6 +5,7 @@
 /// They move points under forces; where bodies may touch they are refused.
 
 #include <gravel/dynamics/gauss_radau.hpp>
+#include <gravel/dynamics/wisdom_holman.hpp>
 #include <gravel/output/snapshot.hpp>
 #include <gravel/space/contact_stage.hpp>
 #include <gravel/space/force_stage.hpp>
@@ -42,31 +43,46 @@ class OrbitStage {
 
   /// Advances all bodies by h [s]. \param forces  as in integrate()
   template <class Forces>
-  void advance(Bodies& bodies, const Scalar& h, const ForceStage<Scalar, Layout>& force, Forces&& forces) {
+  void advance(const SimulationConfig<Scalar>& config, Bodies& bodies, const Scalar& h,
+               const ForceStage<Scalar, Layout>& force, Forces&& forces) {
     const Scalar half = h / Scalar(2);
+    if (config.integrator == IntegratorKind::WisdomHolman) {
+      wisdomHolman_.prepare(bodies);
+    }
     spin(bodies, half, h, force.hasTorques());
-    gaussRadau_.advance(bodies, h, static_cast<bool>(force.hook), forces);
+    if (config.integrator == IntegratorKind::WisdomHolman) {
+      wisdomHolman_.advance(bodies, config.G, h, forces);
+    } else {
+      gaussRadau_.advance(bodies, h, static_cast<bool>(force.hook), forces);
+    }
     spin(bodies, half, Scalar(0), force.hasTorques());
   }
 
-  /// The step that the method asks for [s], within the limits of the configuration.
+  /// The step that the method asks for [s], within the limits of the configuration: Wisdom-Holman's is the
+  /// longest always, since it is symplectic for a fixed step.
   Scalar nextStep(const Bodies& bodies, const SimulationConfig<Scalar>& config) const {
+    if (config.integrator == IntegratorKind::WisdomHolman) {
+      return config.timeStep;
+    }
     const Scalar wanted = gaussRadau_.nextStep() > Scalar(0)
                               ? gaussRadau_.nextStep()
                               : GaussRadau15<Scalar>::firstStep(bodies, config.timeStep);
     return std::clamp<Scalar>(wanted, config.minTimeStep, config.timeStep);
   }
 
-  void save(SnapshotWriter& out) const {
+  void save(const Bodies& bodies, SnapshotWriter& out) const {
     const std::vector<Scalar> state = gaussRadau_.state();
     out.array("Gauss-Radau", state.data(), state.size());
+    const std::vector<Scalar> lost = wisdomHolman_.lost().lostParts(bodies);
+    out.array("Wisdom-Holman", lost.data(), lost.size());
   }
 
-  /// \throws std::runtime_error if the file does not hold what save() writes
-  void load(SnapshotReader& in) {
+  /// Of the bodies of the same file. \throws std::runtime_error if the file does not hold what save() writes
+  void load(const gravel::Bodies<Scalar, SoA>& bodies, SnapshotReader& in) {
     if (!gaussRadau_.setState(in.array<Scalar>("Gauss-Radau"))) {
       in.fail("holds a Gauss-Radau state of a wrong length");
     }
+    wisdomHolman_.lost().setLostParts(bodies, in.array<Scalar>("Wisdom-Holman"));
   }
 
  private:
@@ -88,6 +104,7 @@ class OrbitStage {
   }
 
   GaussRadau15<Scalar> gaussRadau_;
+  WisdomHolman<Scalar> wisdomHolman_;
 };
 
 }  // namespace gravel

@@ -67,9 +67,9 @@ template <class Enum>
 struct EnumNames;
 template <>
 struct EnumNames<IntegratorKind> {
-  static constexpr std::array<std::string_view, 11> values{
-      "VelocityVerlet", "Yoshida4", "Yoshida6",       "Yoshida8",           "BlanesMoan4", "BlanesMoan6",
-      "KahanLi6",       "KahanLi8", "ForceGradient4", "SymplecticEpicycle", "GaussRadau15"};
+  static constexpr std::array<std::string_view, 12> values{
+      "VelocityVerlet", "Yoshida4", "Yoshida6",       "Yoshida8",           "BlanesMoan4",  "BlanesMoan6",
+      "KahanLi6",       "KahanLi8", "ForceGradient4", "SymplecticEpicycle", "GaussRadau15", "WisdomHolman"};
 };
 template <>
 struct EnumNames<GravityKind> {

@@ -204,7 +204,7 @@ void Space<Scalar, Layout>::save(const std::string& path) const {
   saveBodies(bodies_, out);
   const std::vector<Scalar> lost = lost_.lostParts(bodies_);
   out.array("lost parts", lost.data(), lost.size());
-  orbits_.save(out);
+  orbits_.save(bodies_, out);
   out.write(path);
 }
 
@@ -225,7 +225,7 @@ void Space<Scalar, Layout>::restore(const std::string& path) {
   bodies.skipIds(BodyId{numbers.nextId});
   const std::vector<Scalar> lost = in.array<Scalar>("lost parts");
   OrbitStage<Scalar, Layout> orbits;
-  orbits.load(in);
+  orbits.load(bodies, in);
 
   // Nothing throws from here on but for want of memory.
   bodies_.assign(bodies);

@@ -83,7 +83,7 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration) {
       const Profiler::Scope scope(profiler_, Phase::Integration);
       const HillFrame<Scalar> frame(contact_.domain);
       if (orbits_.moves(this->config_.integrator)) {
-        orbits_.advance(bodies_, h, force_, forces);
+        orbits_.advance(this->config_, bodies_, h, force_, forces);
       } else if (frame.turns()) {
         integrateEpicycle(frame, bodies_, h, force_.hasTorques(), forces, arrival, departure);
       } else {
