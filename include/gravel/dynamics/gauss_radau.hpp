@@ -212,13 +212,14 @@ class GaussRadau15 {
     dv_ = detail::dot(F_, weights_.snap);
     xTermLow_ = detail::dot(F_, weights_.crackle);
     const auto squared = [](const auto& v) { return Scalar(v.square().sum()); };
+    const auto root = [](const Scalar& x) { return x > Scalar(0) ? Scalar(sqrt(x)) : Scalar(0); };
     Scalar least(-1);
     for (Eigen::Index at = 0; at < last_.x.size(); at += 3) {
-      const Scalar a = sqrt(squared(a0_.template segment<3>(at) + F_[nodes - 1].template segment<3>(at)));
+      const Scalar a = root(squared(a0_.template segment<3>(at) + F_[nodes - 1].template segment<3>(at)));
       const Scalar j_sq = squared(dx_.template segment<3>(at));
       const Scalar s_sq = squared(dv_.template segment<3>(at));
-      const Scalar slow = j_sq + a * Scalar(sqrt(s_sq));
-      const Scalar slower = s_sq + Scalar(sqrt(Scalar(j_sq * squared(xTermLow_.template segment<3>(at)))));
+      const Scalar slow = j_sq + a * root(s_sq);
+      const Scalar slower = s_sq + root(j_sq * squared(xTermLow_.template segment<3>(at)));
       if (slow > Scalar(0) && slower > Scalar(0)) {
         const Scalar t_sq = std::max<Scalar>(Scalar(2) * a * a / slow, slow / slower);
         least = least < Scalar(0) || t_sq < least ? t_sq : least;

@@ -64,10 +64,11 @@ namespace detail {
 /// A number of a table in the scalar's own precision.
 template <Real Scalar>
 Scalar fromTable(long double x) {
-  if constexpr (std::is_floating_point_v<Scalar> || !std::constructible_from<Scalar, long double>) {
-    return Scalar(static_cast<std::conditional_t<std::is_floating_point_v<Scalar>, Scalar, double>>(x));
+  if constexpr (std::is_floating_point_v<Scalar>) {
+    return static_cast<Scalar>(x);
   } else {
-    return Scalar(x);
+    const auto high = static_cast<double>(x);
+    return Scalar(high) + Scalar(static_cast<double>(x - static_cast<long double>(high)));
   }
 }
 

@@ -64,10 +64,12 @@ void keplerIncrements(const Vector3<Scalar>& x, const Vector3<Scalar>& v, const 
   if (beta > Scalar(0)) {
     const Scalar turn = Scalar(2) * pi<Scalar>() / sqrt(beta);  // of s
     const Scalar period = turn * GM / beta;
-    while (h > period || h < -period) {
-      const Scalar turns = h / period;
-      using std::floor;
-      h -= period * Scalar(floor(turns));
+    Scalar turns = period;  // whole turns are taken off, most of them first
+    while (turns < h || turns < -h) {
+      turns *= Scalar(2);
+    }
+    for (; turns >= period; turns /= Scalar(2)) {
+      h += h > turns ? Scalar(-turns) : h < -turns ? turns : Scalar(0);
     }
     low = h > Scalar(0) ? Scalar(0) : Scalar(-turn);
     high = low + turn;

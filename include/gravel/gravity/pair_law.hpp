@@ -14,14 +14,15 @@ namespace gravel {
 template <Real S>
 struct PairLaw {
   /// Squared length, in units of the system's extent, below which two points count as one: distances of
-  /// 1e-100 in double, 1e-12 in float. Chosen so that s^(-3/2) stays in range.
+  /// 1e-100 in double, 1e-12 in float, 1e-50 in other types. Chosen so that s^(-3/2) stays in range, and for
+  /// dual numbers its square, by which the derivative of the quotient divides.
   static S tiny() {
     if constexpr (std::is_same_v<S, float>) {
       return 1e-24F;
     } else if constexpr (std::is_floating_point_v<S>) {
       return S(1e-200L);
     } else {
-      return S(1e-200);
+      return S(1e-100);
     }
   }
 
