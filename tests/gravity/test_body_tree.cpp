@@ -117,8 +117,9 @@ TEST_CASE("centres, radii and moments of cells are those of their bodies") {
       radius = std::max(radius, s.norm());
     }
     CHECK_THAT(cell.mass, WithinRel(mass, 1e-13));
-    CHECK_THAT(cell.radius, WithinAbs(radius, 1e-14));
-    CHECK(cell.spread <= cell.radius * (1 + 1e-14));
+    CHECK(static_cast<double>(cell.radius) >= radius);
+    CHECK(static_cast<double>(cell.radius) <= (cell.count() <= 512 ? 1.000003 : 1.5) * radius);
+    CHECK(cell.spread <= cell.radius * 1.00001F);
     for (std::size_t k = 0; k < q.size(); ++k) {
       REQUIRE_THAT(moments.of(c)[k], WithinAbs(sum[k], 1e-14 * mass));  // all lengths are below 1
     }

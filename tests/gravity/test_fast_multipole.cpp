@@ -237,14 +237,14 @@ TEST_CASE("all at one point, on a line, on a plane") {
 }
 
 TEST_CASE("two clusters a million radii apart, and one body a billion times heavier") {
-  auto apart = gravityScene<double>("uniform sphere", 1200);
-  for (std::size_t i = 0; i < 600; ++i) {
+  auto apart = gravityScene<double>("uniform sphere", 6000);
+  for (std::size_t i = 0; i < 3000; ++i) {
     apart.positions[i][1] += 1e6;
   }
-  const Errors far = errors(apart, accelerations(apart, 1e-6), 0, 3);
+  const Errors far = errors(apart, accelerations(apart, 1e-3), 0, 40);
   CAPTURE(far.rms);
-  CHECK(far.rms <= 1e-6);
-  CHECK(far.rms > 1e-11);  // of 600 bodies most pairs are near
+  CHECK(far.rms <= 1e-3);
+  CHECK(far.rms > 1e-5);
 
   auto heavy = gravityScene<double>("uniform sphere", 1200);
   heavy.masses[7] = 1e9 * heavy.masses[8];
@@ -266,7 +266,8 @@ TEMPLATE_TEST_CASE("other units change the result by rounding at most", "", floa
   CHECK(accelerations(other, S(1e-4)) == accelerations(points, S(1e-4)));
 }
 
-TEMPLATE_TEST_CASE("expansions give every layout the bits of plain vectors", "", SoA, AoS, AoSoA<4>, AoSoA<8>) {
+TEMPLATE_TEST_CASE("expansions give every layout the bits of plain vectors", "", SoA, AoS, AoSoA<4>,
+                   AoSoA<8>) {
   const auto points = gravityScene<double>("Plummer sphere", 500);
   Bodies<double, TestType> bodies;
   for (std::size_t i = 0; i < points.size(); ++i) {

@@ -13,14 +13,17 @@
 
 namespace gravel::detail {
 
-/// S is the scalar of far-field work.
+/// S is the scalar of far-field work. For double, one line of a cache.
 template <Real S>
 struct TreeCell {
+  /// Sizes need few digits; they are rounded up.
+  using Size = std::conditional_t<std::is_floating_point_v<S>, float, S>;
+
   Vector3<S> centre = Vector3<S>::Zero();  ///< of mass; of the bodies where none has mass
   S mass = S(0);
-  S radius = S(0);  ///< around the centre, holds all bodies
-  S spread = S(0);  ///< (sum m s^q / M)^(1/q), s the distance from the centre: radius of the mass
-  S weight = S(0);  ///< what errors at these bodies are measured against [acceleration]
+  S weight = S(0);        ///< what errors at these bodies may be [acceleration]
+  Size radius = Size(0);  ///< around the centre, holds all bodies
+  Size spread = Size(0);  ///< (sum m s^q / M)^(1/q), s the distance from the centre: radius of the mass
   std::uint32_t first = 0;
   std::uint32_t last = 0;  ///< bodies [first, last)
   std::uint32_t child = 0;
@@ -28,6 +31,14 @@ struct TreeCell {
 
   bool isLeaf() const { return children == 0; }
   std::uint32_t count() const { return last - first; }
+
+  static Size sizeOf(const S& x) {
+    if constexpr (std::is_floating_point_v<S>) {
+      return static_cast<float>(x) * 1.000001F;
+    } else {
+      return x;
+    }
+  }
 };
 
 /// Positions and masses in columns in the order of the tree; cells breadth first, the root at 0.
@@ -39,11 +50,14 @@ struct BodyTree {
   /// First cell of each group, and the end: no cell is in its parent's group, and parents come first.
   std::vector<std::size_t> levels;
 
-  std::size_t size() const { return x.size(); }
+  /// Rows behind the last one that may be read, in whole tiles.
+  static constexpr std::size_t margin = 16;
+
+  std::size_t size() const { return body.size(); }
 
   void resize(std::size_t n) {
     for (std::vector<S>* column : {&x, &y, &z, &m}) {
-      column->resize(n);
+      column->assign(n + margin, S(0));
     }
     body.resize(n);
   }

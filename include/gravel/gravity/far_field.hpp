@@ -24,21 +24,38 @@ class FarField {
         first_(first),
         softening_sq_(softening_sq),
         terms_(moments.terms()),
-        regular_(terms_),
         spread_(static_cast<std::size_t>(D::size(order))),
         laneMoments_(terms_ * parts),
         laneLocals_(terms_ * parts),
         laneDerivatives_(spread_.size()),
-        laneRegular_(terms_) {}
+        laneRegular_(terms_),
+        laneMoved_(terms_) {}
 
   std::size_t terms() const { return terms_; }
 
-  /// The local expansion of a cell's parent about the cell's own centre.
-  void shift(const Cell& parent, const F* from, const Cell& cell, F* to) {
-    const Vector3<F> t = cell.centre - parent.centre;
-    X::regular(order_, F(t[0]), F(t[1]), F(t[2]), regular_.data());
+  /// A cell's local expansion about the centre of each of its children, one after another.
+  void shiftToChildren(const Cell& cell, const F* from, F* to) {
     spreadOut(from);
-    X::contract(order_, first_, order_, regular_.data(), spread_.data(), to);
+    for (std::uint32_t child = 0; child < cell.children; child += Batch::width) {
+      alignas(64) F r[3][Batch::width] = {};
+      const std::size_t count = std::min<std::size_t>(Batch::width, cell.children - child);
+      for (std::size_t w = 0; w < count; ++w) {
+        const Cell& part = tree_.cells[cell.child + child + w];
+        for (int axis = 0; axis < 3; ++axis) {
+          r[axis][w] = part.centre[axis] - cell.centre[axis];
+        }
+      }
+      X::regular(order_, Batch::load(r[0]), Batch::load(r[1]), Batch::load(r[2]), laneRegular_.data());
+      std::fill(laneMoved_.begin(), laneMoved_.end(), Batch::zero());
+      X::contract(order_, first_, order_, laneRegular_.data(), spread_.data(), laneMoved_.data());
+      const auto* lanes = reinterpret_cast<const F*>(laneMoved_.data());
+      for (std::size_t w = 0; w < count; ++w) {
+        F* out = to + (child + w) * terms_;
+        for (std::size_t k = 0; k < terms_; ++k) {
+          out[k] = lanes[k * Batch::width + w];
+        }
+      }
+    }
   }
 
   /// Starts a new cell of sinks.
@@ -48,6 +65,7 @@ class FarField {
   }
 
   void add(const Cell& sink, std::uint32_t source) {
+    prefetch(moments_.of(source));
     waiting_[batched_++] = source;
     if (batched_ == Batch::size) {
       flush(sink);
@@ -148,6 +166,13 @@ class FarField {
     }
   }
 
+  /// Moments lie anywhere in memory; by the time their batch is full they have come.
+  void prefetch(const F* moments) const {
+    for (std::size_t k = 0; k < terms_; k += std::max<std::size_t>(1, 64 / sizeof(F))) {
+      __builtin_prefetch(moments + k);
+    }
+  }
+
   /// A local expansion in the rows of derivatives.
   void spreadOut(const F* local) {
     for (int n = 0; n <= order_; ++n) {
@@ -164,8 +189,8 @@ class FarField {
   int first_;
   S softening_sq_;
   std::size_t terms_;
-  std::vector<F> regular_, spread_;
-  std::vector<V> laneMoments_, laneLocals_, laneDerivatives_, laneRegular_;
+  std::vector<F> spread_;
+  std::vector<V> laneMoments_, laneLocals_, laneDerivatives_, laneRegular_, laneMoved_;
   std::array<std::uint32_t, Batch::size> waiting_{};
   std::size_t batched_ = 0;
   std::size_t batches_ = 0;

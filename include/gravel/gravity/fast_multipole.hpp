@@ -77,7 +77,7 @@ class FastMultipole {
   /// Expansions of float bodies are in double: their coefficients are out of float's range.
   using F = std::conditional_t<std::is_same_v<S, float>, double, S>;
 
-  static constexpr std::uint32_t leafSize = 16;
+  static constexpr std::uint32_t leafSize = 64;
 
   template <class Positions, class Masses>
   void evaluate(const Positions& positions, const Masses& masses, const S& G, const S& softening,
@@ -101,7 +101,7 @@ class FastMultipole {
   template <class Terms>
   void walk(detail::TreeMoments<S, F, Terms>& moments, const S& softening_sq) {
     const detail::MultipolePlan& plan = detail::planMultipoles(tolerance_);
-    const detail::WalkLimits limits{plan.order, plan.pairsDirect, 4 * plan.pairsDirect};
+    const detail::WalkLimits limits{plan.order, plan.pairsDirect, 8 * plan.pairsDirect};
     moments.compute(tree_, limits.order);
     strength_.compute(tree_, F(F(tolerance_) / F(plan.safety)));
     using Walk = detail::MultipoleWalk<S, F, Terms>;

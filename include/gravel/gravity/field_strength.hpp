@@ -44,7 +44,7 @@ class FieldStrength {
   }
 
  private:
-  static constexpr std::uint32_t groupSize = 32;
+  static constexpr std::uint32_t groupSize = 64;
 
   static F fieldAt(const BodyTree<S, F>& tree, const TreeCell<F>& group, std::vector<std::uint32_t>& todo) {
     using std::sqrt;
@@ -55,9 +55,11 @@ class FieldStrength {
       todo.pop_back();
       const Vector3<F> d = source.centre - group.centre;
       const F r_sq = d.squaredNorm();
-      const F both = source.radius + group.radius;
-      if (source.isLeaf() || r_sq > both * both) {
-        const F s = r_sq + (r_sq > both * both ? F(0) : F(both * both));
+      const F own = F(source.radius) * F(source.radius);
+      const bool isFar = r_sq > F(1.5) * own;
+      if (isFar || source.isLeaf() || source.count() <= groupSize) {
+        const F near = F(group.radius) * F(group.radius);
+        const F s = r_sq + (isFar && r_sq > near ? F(0) : F(own + near));
         if (s > F(0)) {
           sum += (source.mass / (s * sqrt(s))) * d;
         }

@@ -7,8 +7,7 @@
 
 namespace gravel::detail {
 
-/// What is chosen for one band of tolerances. Measured with `benchmarks/gravity_front`; see
-/// docs/theory-gravity.md for how.
+/// What is chosen for one band of tolerances. Measured; see docs/theory-gravity.md.
 struct MultipolePlan {
   double tolerance;           ///< smallest that this row serves
   int order;                  ///< of the expansions
@@ -17,16 +16,15 @@ struct MultipolePlan {
   std::size_t crossover;      ///< bodies from which on it is faster than the direct sum
 };
 
-inline constexpr std::array<MultipolePlan, 9> multipolePlans{{
-    {3e-3, 3, 1.7, 64, 1500},
-    {3e-4, 4, 1.4, 64, 3000},
-    {3e-5, 5, 1.35, 64, 6000},
-    {3e-6, 7, 1.0, 128, 10000},
-    {3e-7, 8, 1.05, 128, 16000},
-    {3e-8, 10, 0.8, 128, 25000},
-    {3e-9, 11, 0.75, 192, 40000},
-    {3e-10, 12, 0.75, 192, 60000},
-    {0.0, 14, 0.7, 256, 90000},
+inline constexpr std::array<MultipolePlan, 8> multipolePlans{{
+    {3e-3, 4, 0.65, 64, 3000},
+    {1e-3, 5, 0.65, 128, 3700},
+    {1e-4, 6, 0.6, 128, 5000},
+    {1e-5, 8, 0.6, 256, 8000},
+    {1e-6, 9, 0.5, 256, 12500},
+    {3e-8, 10, 0.45, 384, 23000},
+    {1e-9, 12, 0.45, 512, 50000},
+    {0.0, 14, 0.45, 512, 85000},
 }};
 
 /// The row for a tolerance.

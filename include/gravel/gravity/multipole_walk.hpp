@@ -46,10 +46,10 @@ class MultipoleWalk {
         out_(out),
         far_(tree, moments, limits.order, out.potential.empty() ? 1 : 0, softening_sq) {}
 
-  /// Where a walk can be taken up again: a cell, its parent's local expansion and the sources it has to meet.
+  /// Where a walk can be taken up again: a cell, what its parent left it of the local expansion, and the
+  /// sources that it has to meet.
   struct Start {
     std::uint32_t cell = 0;
-    std::uint32_t parent = 0;
     std::vector<F> local;
     std::vector<std::uint32_t> sources;
   };
@@ -59,8 +59,7 @@ class MultipoleWalk {
     std::vector<Start> starts;
     prepared_ = &starts;
     handOver_ = bodies;
-    stack_.assign(1, 0);
-    descend(0, 0, 0, 1, 0);
+    run({0, std::vector<F>(far_.terms(), F(0)), {0}});
     prepared_ = nullptr;
     return starts;
   }
@@ -68,7 +67,7 @@ class MultipoleWalk {
   void run(const Start& start) {
     stack_ = start.sources;
     locals_ = start.local;
-    descend(start.cell, start.parent, 0, stack_.size(), start.local.empty() ? 0 : 1);
+    descend(start.cell, 0, stack_.size(), 0);
   }
 
   const WalkCount& count() const { return count_; }
@@ -76,18 +75,15 @@ class MultipoleWalk {
  private:
   using Cell = TreeCell<F>;
 
-  void descend(std::uint32_t c, std::uint32_t parent, std::size_t begin, std::size_t end, std::size_t level) {
+  /// The cell's local expansion stands at `local` in locals_; those of its children follow behind.
+  void descend(std::uint32_t c, std::size_t begin, std::size_t end, std::size_t local) {
     const Cell& cell = tree_.cells[c];
+    const std::size_t terms = far_.terms();
     if (prepared_ != nullptr && (cell.count() <= handOver_ || cell.isLeaf())) {
-      Start start{c, parent, {}, {}};
-      start.sources.assign(at(stack_, begin), at(stack_, end));
-      if (level > 0) {
-        start.local.assign(at(locals_, (level - 1) * far_.terms()), at(locals_, level * far_.terms()));
-      }
-      prepared_->push_back(std::move(start));
+      prepared_->push_back(
+          {c, {at(locals_, local), at(locals_, local + terms)}, {at(stack_, begin), at(stack_, end)}});
       return;
     }
-    inherit(cell, tree_.cells[parent], level);
     const std::size_t kept = stack_.size();
     far_.begin();
     near_.clear();
@@ -99,16 +95,20 @@ class MultipoleWalk {
         meet(c, source);
       }
     }
-    far_.finish(cell, &locals_[level * far_.terms()]);
+    far_.finish(cell, &locals_[local]);
     near_.apply(tree_, cell.first, cell.last, softening_sq_, out_);
     count_.pairs += near_.size() * cell.count();
     if (cell.isLeaf()) {
-      far_.evaluate(cell, &locals_[level * far_.terms()], out_);
+      far_.evaluate(cell, &locals_[local], out_);
     } else {
       const std::size_t keptEnd = stack_.size();
-      for (std::uint32_t child = cell.child; child < cell.child + cell.children; ++child) {
-        descend(child, c, kept, keptEnd, level + 1);
+      const std::size_t childLocals = locals_.size();
+      locals_.resize(childLocals + cell.children * terms);
+      far_.shiftToChildren(cell, &locals_[local], &locals_[childLocals]);
+      for (std::uint32_t child = 0; child < cell.children; ++child) {
+        descend(cell.child + child, kept, keptEnd, childLocals + child * terms);
       }
+      locals_.resize(childLocals);
     }
     stack_.resize(kept);
   }
@@ -116,17 +116,6 @@ class MultipoleWalk {
   template <class Vector>
   static auto at(Vector& v, std::size_t i) {
     return v.begin() + static_cast<std::ptrdiff_t>(i);
-  }
-
-  /// The cell's local expansion starts as its parent's.
-  void inherit(const Cell& cell, const Cell& parent, std::size_t level) {
-    if (locals_.size() < (level + 1) * far_.terms()) {
-      locals_.resize((level + 1) * far_.terms());
-    }
-    std::fill(at(locals_, level * far_.terms()), at(locals_, (level + 1) * far_.terms()), F(0));
-    if (level > 0) {
-      far_.shift(parent, &locals_[(level - 1) * far_.terms()], cell, &locals_[level * far_.terms()]);
-    }
   }
 
   void meet(std::uint32_t c, std::uint32_t s) {
@@ -172,7 +161,7 @@ class MultipoleWalk {
 
   bool isFar(const Cell& a, const Cell& b) const {
     const F r_sq = (a.centre - b.centre).squaredNorm();
-    const F both = a.radius + b.radius;
+    const F both = F(a.radius) + F(b.radius);
     const F gap = r_sq - both * both;
     return gap > F(0) && isAccurate(a, b, r_sq, gap) && isAccurate(b, a, r_sq, gap);
   }
@@ -180,7 +169,7 @@ class MultipoleWalk {
   /// (M / r^2) ((s + R) / r)^p / (1 - theta^2)^2 within the sink's allowance: s the radius of the source's
   /// mass, R that of the sink.
   bool isAccurate(const Cell& source, const Cell& sink, const F& r_sq, const F& gap) const {
-    const F reach = source.spread + sink.radius;
+    const F reach = F(source.spread) + F(sink.radius);
     const F ratio_sq = reach * reach / r_sq;
     F error = source.mass * r_sq / (gap * gap);
     error *= error;
@@ -196,7 +185,7 @@ class MultipoleWalk {
   SinkFields<S>& out_;
   std::vector<std::uint32_t> stack_;  ///< sources that cells on the path have left to their children
   std::vector<std::uint32_t> todo_;
-  std::vector<F> locals_;  ///< by level of the path
+  std::vector<F> locals_;  ///< of the cells on the path and their siblings
   FarField<S, F, Terms> far_;
   NearField<S> near_;
   std::vector<Start>* prepared_ = nullptr;

@@ -32,10 +32,14 @@ class NearField {
   template <class Tree>
   void addSources(const Tree& tree, std::uint32_t first, std::uint32_t last) {
     const std::size_t n = last - first;
-    reserve(count_ + n);
+    reserve(count_ + n + width);
     const std::vector<S>* from[4] = {&tree.x, &tree.y, &tree.z, &tree.m};
     for (std::size_t column = 0; column < 4; ++column) {
-      std::copy_n(from[column]->data() + first, n, columns_[column].data() + count_);
+      const S* source = from[column]->data() + first;
+      S* to = columns_[column].data() + count_;
+      for (std::size_t i = 0; i < n; i += width) {  // whole tiles: the tree's columns go on behind their end
+        Tile::store(to + i, Tile::load(source + i));
+      }
     }
     count_ += n;
   }

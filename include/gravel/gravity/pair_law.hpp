@@ -30,9 +30,7 @@ struct PairLaw {
   /// 4 where Eigen's packed square root is an estimate with Newton steps (float, and double with AVX-512).
   template <class T>
   static T accelerationFactor(const T& s) {
-    using std::sqrt;
-    const T bounded = atLeast(s, tiny());
-    return T(T(S(1)) / (bounded * sqrt(bounded)));
+    return toMinusThreeHalves(T(atLeast(s, tiny())));
   }
 
   /// p in U = -G m_i m_j p: s^(-1/2) [m^-1]; 0 for coincident points, whose energy has no meaning.
@@ -45,6 +43,17 @@ struct PairLaw {
  private:
   static S atLeast(const S& a, const S& low) { return a < low ? low : a; }
   static S atMost(const S& a, const S& high) { return a < high ? a : high; }
+
+  static S toMinusThreeHalves(const S& s) {
+    using std::sqrt;
+    return S(1) / (s * sqrt(s));
+  }
+  /// Reciprocal square roots need no division where the target estimates them (AVX-512).
+  template <int W>
+  static Lanes<S, W> toMinusThreeHalves(const Lanes<S, W>& s) {
+    const Lanes<S, W> root = s.rsqrt();
+    return root * (root * root);
+  }
 
   template <int W>
   static Lanes<S, W> atLeast(const Lanes<S, W>& a, const S& low) {

@@ -25,7 +25,12 @@ class TreeMoments {
       parallelForChunks(tree.levels[level + 1] - begin, 64, [&](std::size_t from, std::size_t to) {
         Scratch scratch(order, terms_);
         for (std::size_t c = begin + from; c < begin + to; ++c) {
-          measure(tree, tree.cells[c]);
+          TreeCell<F>& cell = tree.cells[c];
+          if (cell.isLeaf() || cell.count() <= bodiesWorthMeasuring) {
+            measure(tree, cell);
+          } else {
+            estimate(tree, cell);
+          }
           if (tree.cells[c].isLeaf() || tree.cells[c].count() <= bodiesWorthShifting) {
             addBodies(tree, c, scratch);
           } else {
@@ -45,6 +50,9 @@ class TreeMoments {
 
   /// Cells of more bodies take the moments of their children.
   static constexpr std::uint32_t bodiesWorthShifting = 64;
+
+  /// Cells of more take bounds of their size from their children.
+  static constexpr std::uint32_t bodiesWorthMeasuring = 512;
 
   struct Scratch {
     std::vector<V> regular, moments, sums;
@@ -84,11 +92,52 @@ class TreeMoments {
       spread += F(tree.m[i]) * power;
     }
     using std::sqrt;
-    cell.radius = sqrt(radius_sq);
-    cell.spread = mass > F(0) ? F(spread / mass) : F(0);
-    for (int k = 1; k < spreadPower(); k *= 2) {
-      cell.spread = sqrt(cell.spread);
+    finishSizes(cell, F(sqrt(radius_sq)), spread);
+  }
+
+  /// Radius and spread as sums of the children's and of their distances (Minkowski's inequality).
+  void estimate(const Tree& tree, TreeCell<F>& cell) const {
+    using std::sqrt;
+    cell.mass = F(0);
+    Vector3<F> all = Vector3<F>::Zero();
+    const Vector3<F> low = tree.cells[cell.child].centre;
+    F bodies(0);
+    for (std::uint32_t child = cell.child; child < cell.child + cell.children; ++child) {
+      const TreeCell<F>& part = tree.cells[child];
+      cell.mass += part.mass;
     }
+    for (std::uint32_t child = cell.child; child < cell.child + cell.children; ++child) {
+      const TreeCell<F>& part = tree.cells[child];
+      const F share = cell.mass > F(0) ? part.mass : F(static_cast<double>(part.count()));
+      all += share * (part.centre - low);
+      bodies += share;
+    }
+    cell.centre = low + all / bodies;
+    F radius(0);
+    F spread(0);
+    for (std::uint32_t child = cell.child; child < cell.child + cell.children; ++child) {
+      const TreeCell<F>& part = tree.cells[child];
+      const F distance = (part.centre - cell.centre).norm();
+      const F reach = distance + F(part.radius);
+      radius = radius < reach ? reach : radius;
+      F power = distance + F(part.spread);
+      for (int k = 1; k < spreadPower(); k *= 2) {
+        power *= power;
+      }
+      spread += part.mass * power;
+    }
+    finishSizes(cell, radius, spread);
+  }
+
+  /// \param spread sum of m s^q
+  void finishSizes(TreeCell<F>& cell, const F& radius, F spread) const {
+    using std::sqrt;
+    cell.radius = TreeCell<F>::sizeOf(radius);
+    spread = cell.mass > F(0) ? F(spread / cell.mass) : F(0);
+    for (int k = 1; k < spreadPower(); k *= 2) {
+      spread = sqrt(spread);
+    }
+    cell.spread = TreeCell<F>::sizeOf(spread);
   }
 
   /// The power of two at or above the order (4 to 16).
