@@ -78,7 +78,7 @@ double imbalance(const PointMasses<S>& points, const std::vector<Vector3<S>>& a)
 
 }  // namespace
 
-// Seen to fail with twice the error allowed to a pair of cells, and with the dipoles of sinks left out.
+// The total force was seen to fail where a pair of cells is judged from the side of the source alone.
 TEST_CASE("the error is within the tolerance in every scene, rms and worst body") {
   for (const char* name : gravityScenes) {
     const auto points = gravityScene<double>(name, 2000);
