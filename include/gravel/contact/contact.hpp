@@ -19,6 +19,14 @@ inline constexpr std::uint32_t staticPartner = std::numeric_limits<std::uint32_t
 /// Second key of a contact with the boundary of that number; larger than any body's id below 2^63.
 constexpr std::uint64_t boundaryKey(std::uint64_t boundary) { return boundary | (std::uint64_t{1} << 63U); }
 
+/// The names of a contact's two sides, in the order of lists.
+struct ContactKeys {
+  std::uint64_t first;
+  std::uint64_t second;
+
+  friend auto operator<=>(const ContactKeys&, const ContactKeys&) = default;
+};
+
 /// Two bodies, or a body and a boundary, that touch. Named by ids, so that it is recognised in the next step
 /// whatever the bodies' indices are by then; lists are sorted by (key1, key2).
 template <Real Scalar>

@@ -69,6 +69,12 @@ bool isTracer(const B& bodies, std::size_t i) {
          !(bodies.masses()[i] > S(0));
 }
 
+/// False for a tracer, and for two immovable bodies.
+template <class B>
+bool canTouch(const B& bodies, std::size_t i, std::size_t j) {
+  return !isTracer(bodies, i) && !isTracer(bodies, j) && (isMovable(bodies, i) || isMovable(bodies, j));
+}
+
 }  // namespace detail
 
 }  // namespace gravel

@@ -29,6 +29,8 @@ template <Real Scalar>
 struct ContactReport {
   std::size_t contacts = 0;
   std::size_t colours = 0;
+  std::size_t impacts = 0;      ///< blows that were dealt at their own time inside the step
+  std::size_t postponed = 0;    ///< bodies with so many blows in the step that the rest was solved at its end
   int iterations = 0;           ///< sweeps
   Scalar residual = Scalar(0);  ///< [1] largest change of a velocity in the last sweep / largest approach
   Scalar restitutionLoss = Scalar(0);  ///< [J] energy taken by normal impulses

@@ -8,6 +8,8 @@
 #include <gravel/core/parallel.hpp>
 #include <gravel/spatial/pair.hpp>
 
+#include <optional>
+#include <span>
 #include <string>
 
 namespace gravel {
@@ -23,6 +25,8 @@ struct NarrowPhaseSettings {
   /// close the gap within the step, gap < (|a_1| + |a_2|) step^2, and the gap is below a thousandth of the
   /// radii. Such a contact may approach until its gap is closed.
   Scalar step = Scalar(0);
+  /// Who rests on whom, sorted: only these stay contacts with a gap. Without it every pair so near does.
+  std::optional<std::span<const ContactKeys>> resting = std::nullopt;
 };
 
 /// Turns candidate pairs and boundaries into the list of contacts, sorted by keys. Keeps its workspace from
@@ -114,6 +118,10 @@ class NarrowPhase {
     return std::max<S>(settings.margin, std::min<S>(closing, restingMargin() * radii));
   }
 
+  static bool mayRest(const NarrowPhaseSettings<S>& settings, const ContactKeys& keys) {
+    return !settings.resting || std::binary_search(settings.resting->begin(), settings.resting->end(), keys);
+  }
+
   static const Material<S>& surface(std::span<const Material<S>> materials, std::uint32_t id) {
     if (id >= materials.size()) {
       detail::refuse("material of a body", std::to_string(id),
@@ -148,6 +156,9 @@ class NarrowPhase {
     }
     const std::uint32_t m_i = bodies.materials()[i];
     const std::uint32_t m_j = bodies.materials()[j];
+    if (touch->gap >= settings.margin && !mayRest(settings, {id_i, id_j})) {
+      return;
+    }
     const Material<S>& surface_i = surface(materials, m_i);
     part.push_back(Contact<S>{i, j, id_i, id_j, touch->normal, touch->gap, touch->arm1, touch->arm2,
                               m_i == m_j ? surface_i : mix(surface_i, surface(materials, m_j)), drift});
@@ -162,7 +173,8 @@ class NarrowPhase {
       const S margin = marginOf(settings, radius, [&] { return accelerationOf(bodies, i); });
       const auto touch =
           sphereHalfSpace<S>(Vector3<S>(bodies.positions()[i]), radius, wall.normal, wall.offset, margin);
-      if (touch && detail::isMovable(bodies, i)) {
+      if (touch && detail::isMovable(bodies, i) &&
+          (touch->gap < settings.margin || mayRest(settings, {bodies.ids()[i], boundaryKey(wall.number)}))) {
         part.push_back(Contact<S>{static_cast<std::uint32_t>(i), staticPartner, bodies.ids()[i],
                                   boundaryKey(wall.number), touch->normal, touch->gap, touch->arm1,
                                   touch->arm2, mix(surface(materials, bodies.materials()[i]), wall.material),

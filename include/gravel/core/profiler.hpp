@@ -16,6 +16,7 @@ enum class Phase : std::uint8_t {
   Integration,
   NeighbourSearch,
   NarrowPhase,
+  Impacts,
   Colouring,
   ContactSolve,
   PositionalCorrection,
@@ -25,11 +26,11 @@ enum class Phase : std::uint8_t {
   Diagnostics,
 };
 
-inline constexpr std::size_t phaseCount = 10;
+inline constexpr std::size_t phaseCount = 11;
 
 constexpr const char* phaseName(Phase phase) {
   constexpr std::array<const char*, phaseCount> names{
-      "integration",     "neighbour search", "narrow phase", "colouring", "contact solve",
+      "integration",     "neighbour search", "narrow phase", "impacts", "colouring", "contact solve",
       "pos. correction", "gravity",          "damping",      "time step", "diagnostics"};
   return names[static_cast<std::size_t>(phase)];
 }

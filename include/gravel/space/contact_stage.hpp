@@ -6,10 +6,12 @@
 #include <gravel/contact/boundary_list.hpp>
 #include <gravel/contact/collision_outcome.hpp>
 #include <gravel/contact/contact_solver.hpp>
+#include <gravel/contact/impact_events.hpp>
 #include <gravel/contact/narrow_phase.hpp>
 #include <gravel/core/profiler.hpp>
 #include <gravel/dynamics/boundary.hpp>
 #include <gravel/dynamics/epicycle.hpp>
+#include <gravel/dynamics/epicycle_course.hpp>
 #include <gravel/output/snapshot.hpp>
 #include <gravel/space/force_stage.hpp>
 #include <gravel/space/material_table.hpp>
@@ -35,42 +37,32 @@ class ContactStage {
   /// Brings bodies back into the domain. \return the energy that they have more there [J]
   Scalar wrap(Bodies& bodies, const Scalar& time) const { return wrapBodies(bodies, domain, time); }
 
-  /// Finds all contacts at the present positions, for steps of length h [s].
-  void detect(const Bodies& bodies, const Config& config, const Scalar& time, const Scalar& h,
+  /// Finds all contacts at the present positions, for steps of length h [s]. All pairs as near as what rests
+  /// are taken to rest; those of the last step alone, if `goesOn`.
+  void detect(const Bodies& bodies, const Config& config, const Scalar& time, const Scalar& h, bool goesOn,
               Profiler& profiler) {
-    contacts_.clear();
+    const bool searched = searched_;
+    searched_ = false;
     coloured_ = false;
     const char* reason = reasonToSkip(bodies);
     if (reason != nullptr) {
+      contacts_.clear();
       profiler.skip(Phase::NeighbourSearch, reason);
       profiler.skip(Phase::NarrowPhase, reason);
       return;
     }
-    Scalar largest(0);
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      largest = std::max<Scalar>(largest, bodies.radii()[i]);
-    }
-    const Scalar margin = Scalar(2) * largest * NarrowPhase<Scalar>::restingMargin();
-    {
-      const Profiler::Scope scope(profiler, Phase::NeighbourSearch);
-      neighbours_.setKind(config.broadPhase);
-      neighbours_.update(bodies.positions(), bodies.radii(), bodies.ids(), bodies.revision(), domain, time,
-                         margin);
+    if (!searched || !goesOn) {
+      search(bodies, config, time, AtRest{}, profiler);
     }
     const Profiler::Scope scope(profiler, Phase::NarrowPhase);
-    const std::vector<Material<Scalar>>& surfaces = materials.renewed(config);
-    walls_.clear();
-    for (const Plane<Scalar>& plane : boundaries.planes()) {
-      walls_.push_back({plane.normal, plane.offset, surfaces[static_cast<std::size_t>(plane.material)],
-                        plane.velocity, plane.number});
+    prepareSurfaces(config);
+    NarrowPhaseSettings<Scalar> settings{time, config.epsilon, Scalar(0), h};
+    if (goesOn) {
+      rememberResting();
+      settings.resting = resting_;
     }
-    std::optional<std::span<const std::uint32_t>> nearWalls;
-    if (domain.isOpen()) {
-      nearWalls = nearWalls_.update(bodies.positions(), bodies.radii(), walls_, neighbours_.rebuilt(),
-                                    neighbours_.skin(), margin);
-    }
-    narrow_.find(neighbours_.pairs(), bodies, domain, surfaces, walls_, {time, config.epsilon, Scalar(0), h},
-                 contacts_, nearWalls);
+    narrow_.find(neighbours_.pairs(), bodies, domain, materials.entries(), walls_, settings, contacts_,
+                 nearBoundaries(bodies));
   }
 
   /// The plane moves on at another velocity; what rests on it feels that at once.
@@ -82,6 +74,45 @@ class ContactStage {
       }
     }
   }
+
+  /// Before the drift of a step of length h [s] from `time`: deals the impacts inside it, each at its own
+  /// time, so that the drift ends where the bodies are after them. Adds to the report of the step.
+  void strike(Bodies& bodies, const Config& config, const HillFrame<Scalar>& frame, const Scalar& time,
+              const Scalar& h, Profiler& profiler) {
+    const char* reason = reasonToSkip(bodies);
+    if (reason != nullptr) {
+      profiler.skip(Phase::Impacts, reason);
+      return;
+    }
+    if (frame.turns()) {
+      EpicycleCourse<Scalar> course(frame, h);
+      course.foresee(bodies);
+      strike(bodies, config, course, time, h, profiler);
+    } else {
+      StraightCourse<Scalar> course;
+      strike(bodies, config, course, time, h, profiler);
+    }
+  }
+
+  /// Pairs that touched in the last step: contacts at its end, and impacts of others.
+  std::size_t touches() const {
+    std::size_t count = contacts_.size();
+    struck_.clear();
+    for (const Impact<Scalar>& impact : impacts_.impacts()) {
+      struck_.push_back({impact.key1, impact.key2});
+    }
+    std::sort(struck_.begin(), struck_.end());
+    struck_.erase(std::unique(struck_.begin(), struck_.end()), struck_.end());
+    for (const ContactKeys& keys : struck_) {
+      const auto before = [&](const Contact<Scalar>& c) { return ContactKeys{c.key1, c.key2} < keys; };
+      const auto found = std::partition_point(contacts_.begin(), contacts_.end(), before);
+      count += found == contacts_.end() || ContactKeys{found->key1, found->key2} != keys ? 1U : 0U;
+    }
+    return count;
+  }
+
+  /// The blows inside the last step, in the order in which they were dealt.
+  const std::vector<Impact<Scalar>>& impacts() const { return impacts_.impacts(); }
 
   /// Shrinks overlaps by moving bodies, and renews the geometry of the contacts, so that impulses act where
   /// the bodies are.
@@ -165,6 +196,7 @@ class ContactStage {
   void beginStep() {
     report_ = {};
     firstHalf_.clear();
+    impacts_.clear();
   }
 
   /// The first half of the step is solved: its impulses are kept for impulses().
@@ -274,6 +306,91 @@ class ContactStage {
     });
   }
 
+  template <class Course>
+  void strike(Bodies& bodies, const Config& config, Course& course, const Scalar& time, const Scalar& h,
+              Profiler& profiler) {
+    const auto way = [&](std::size_t i) -> Vector3<Scalar> {
+      return detail::isMovable(bodies, i) ? Vector3<Scalar>(course.velocity(bodies, i) * h)
+                                          : Vector3<Scalar>(Vector3<Scalar>::Zero());
+    };
+    search(bodies, config, time, way, profiler);
+    searched_ = true;
+    const Profiler::Scope scope(profiler, Phase::Impacts);
+    prepareSurfaces(config);
+    struct Near {
+      NeighbourList<Scalar>& list;
+      const decltype(way)& travel;
+      const std::vector<Pair>& pairs() const { return list.pairs(); }
+      void follow(const Bodies& all, std::uint32_t i, const Scalar&, std::vector<Pair>& out) {
+        list.follow(i, all.positions(), all.radii(), all.ids(), travel(i), travel, out);
+      }
+    } near{neighbours_, way};
+    const ImpactReport<Scalar> blows = impacts_.resolve(
+        bodies, near, domain, std::span<const Material<Scalar>>(materials.entries()),
+        std::span<const HalfSpace<Scalar>>(walls_), std::span<const Contact<Scalar>>(contacts_),
+        ImpactSettings<Scalar>{time, h, std::max(config.restitutionThreshold, config.epsilon),
+                               config.epsilon},
+        nearBoundaries(bodies), course);
+    neighbours_.add(impacts_.candidatesAdded(), bodies.ids());
+    for (const TurnChange<Scalar>& turn : impacts_.turns()) {
+      // The drift turns the body by the new spin for all of h.
+      auto&& q = bodies[turn.body].orientation();
+      q = rotated(rotated(Quaternion<Scalar>(q), turn.before, turn.time), turn.after, Scalar(-turn.time));
+    }
+    report_.impacts += blows.impacts;
+    report_.postponed += blows.postponed;
+    report_.restitutionLoss += blows.restitutionLoss;
+    report_.frictionLoss += blows.frictionLoss;
+    report_.driftWork += blows.driftWork;
+  }
+
+  template <class Travel>
+  void search(const Bodies& bodies, const Config& config, const Scalar& time, const Travel& travel,
+              Profiler& profiler) {
+    const Profiler::Scope scope(profiler, Phase::NeighbourSearch);
+    neighbours_.setKind(config.broadPhase);
+    Scalar largest(0);
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      largest = std::max<Scalar>(largest, bodies.radii()[i]);
+    }
+    margin_ = Scalar(2) * largest * NarrowPhase<Scalar>::restingMargin();
+    neighbours_.update(bodies.positions(), bodies.radii(), bodies.ids(), bodies.revision(), domain, time,
+                       margin_, travel);
+  }
+
+  void prepareSurfaces(const Config& config) {
+    const std::vector<Material<Scalar>>& surfaces = materials.renewed(config);
+    walls_.clear();
+    for (const Plane<Scalar>& plane : boundaries.planes()) {
+      walls_.push_back({plane.normal, plane.offset, surfaces[static_cast<std::size_t>(plane.material)],
+                        plane.velocity, plane.number});
+    }
+  }
+
+  std::optional<std::span<const std::uint32_t>> nearBoundaries(const Bodies& bodies) {
+    if (!domain.isOpen() || neighbours_.strays()) {
+      return std::nullopt;
+    }
+    return nearWalls_.update(bodies.positions(), bodies.radii(), walls_, neighbours_.rebuilt(),
+                             neighbours_.skin(), margin_);
+  }
+
+  /// Who was in contact at the step's start, or came to rest in it.
+  void rememberResting() {
+    resting_.clear();
+    for (const Contact<Scalar>& c : contacts_) {
+      resting_.push_back({c.key1, c.key2});
+    }
+    const auto old = static_cast<std::ptrdiff_t>(resting_.size());
+    for (const Impact<Scalar>& impact : impacts_.impacts()) {
+      if (impact.rests) {
+        resting_.push_back({impact.key1, impact.key2});
+      }
+    }
+    std::sort(resting_.begin() + old, resting_.end());
+    std::inplace_merge(resting_.begin(), resting_.begin() + old, resting_.end());
+  }
+
   const char* reasonToSkip(const Bodies& bodies) const {
     if (bodies.size() < 2 && boundaries.empty()) {
       return "one body and no boundary";
@@ -290,6 +407,11 @@ class ContactStage {
   NeighbourList<Scalar> neighbours_;
   BoundaryList<Scalar> nearWalls_;
   NarrowPhase<Scalar> narrow_;
+  ImpactEvents<Scalar> impacts_;
+  std::vector<ContactKeys> resting_;
+  mutable std::vector<ContactKeys> struck_;
+  Scalar margin_ = Scalar(0);  // of the neighbours: what rests may have a gap
+  bool searched_ = false;      // neighbours_ hold for the whole drift
   std::vector<Contact<Scalar>> contacts_;
   ContactSolver<Scalar> solver_;
   std::vector<StoredImpulse<Scalar>> firstHalf_;

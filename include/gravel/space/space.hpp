@@ -139,7 +139,8 @@ class Space : public Settings<Scalar> {
   /// Positions, orientations, torques, angular accelerations.
   std::tuple<std::vector<Vector>, std::vector<Quaternion<Scalar>>, std::vector<Vector>, std::vector<Vector>>
   getDataForDisplay() const;
-  std::size_t contactCount() const { return contact_.contacts().size(); }
+  /// Pairs that touched in the last step: contacts() and impacts(), each pair once.
+  std::size_t contactCount() const { return contact_.touches(); }
   /// What the contact solver reached in the last step.
   const ContactReport<Scalar>& contactReport() const { return contact_.report(); }
   /// Contacts of the last step, in the order of ids.
@@ -154,6 +155,9 @@ class Space : public Settings<Scalar> {
   SupportedWeight<Scalar> supportedWeight() const;
   /// Force [N] on a plane over the last step. \throws std::out_of_range if no plane has this number
   Vector planeForce(std::size_t plane) const;
+  /// Blows that were dealt at their own time inside the last step, in their order; their times are those
+  /// since its start.
+  const std::vector<Impact<Scalar>>& impacts() const { return contact_.impacts(); }
   /// Bodies that touch each body, by index, at the last step.
   std::vector<std::vector<std::size_t>> collisionGraph() const;
   /// Seconds by phase, and what was skipped and why, on standard output.

@@ -92,6 +92,15 @@ std::vector<std::vector<std::size_t>> Space<Scalar, Layout>::collisionGraph() co
       graph[contact.second].push_back(contact.first);
     }
   }
+  for (const Impact<Scalar>& impact : impacts()) {
+    if (impact.second != staticPartner && impact.first < n() && impact.second < n()) {
+      std::vector<std::size_t>& partners = graph[impact.first];
+      if (std::find(partners.begin(), partners.end(), impact.second) == partners.end()) {
+        partners.push_back(impact.second);
+        graph[impact.second].push_back(impact.first);
+      }
+    }
+  }
   return graph;
 }
 

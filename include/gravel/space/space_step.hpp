@@ -5,8 +5,8 @@
 ///
 /// Order of a step of length h, with a(x) the acceleration of the last evaluation:
 ///   1. half a kick by the integrator's table; contacts of the last step are solved together, so that what
-///   rests
-///      on something does not sink in the drift; drift;
+///      rests on something does not sink in the drift; impacts on the way are dealt at their own times;
+///      drift;
 ///   2. when positions are final, contacts are found there, and overlaps shrink by moving bodies (no velocity
 ///      changes);
 ///   3. forces at those positions, last kick;
@@ -52,14 +52,21 @@ void Space<Scalar, Layout>::advanceTo(Scalar time) {
   }
 }
 
-/// Between the first kick and the drift: the contacts that the last step left.
+/// Between the first kick and the drift: the contacts that the last step left, and the impacts on the way.
 template <Real Scalar, class Layout>
 struct Space<Scalar, Layout>::Departure {
   Space* space;
-  explicit operator bool() const { return space->contactCount() > 0; }
+  Scalar h;
+  explicit operator bool() const { return true; }
   void operator()(const Scalar& kick) const {
-    space->resolveCollisions();
-    space->contact_.endFirstHalf(space->force_, space->bodies_, kick);
+    if (!space->contacts().empty()) {
+      space->resolveCollisions();
+      space->contact_.endFirstHalf(space->force_, space->bodies_, kick);
+    }
+    const HillFrame<Scalar> frame(space->contact_.domain);
+    if (frame.turns() || traitsOf(space->config_.integrator).forceEvaluations == 1) {  // one drift
+      space->contact_.strike(space->bodies_, space->config_, frame, space->time_, h, space->profiler_);
+    }
   }
 };
 
@@ -72,11 +79,11 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration) {
       force_.evaluate(bodies_, getG(), this->config_.softening, Scalar(time_ + passed), profiler_);
     };
     contact_.beginStep();
-    const Departure departure{this};
+    const Departure departure{this, h};
     const auto arrival = [&] {
       contact_.boundaries.advance(h);
       left_.work -= contact_.wrap(bodies_, Scalar(time_ + h));
-      contact_.detect(bodies_, this->config_, Scalar(time_ + h), h, profiler_);
+      contact_.detect(bodies_, this->config_, Scalar(time_ + h), h, true, profiler_);
       contact_.separate(bodies_, this->config_, Scalar(time_ + h), profiler_);
     };
     {
@@ -185,7 +192,7 @@ void Space<Scalar, Layout>::applyGravity() {
 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::buildCollisionGraph() {
-  contact_.detect(bodies_, this->config_, time_, dt_, profiler_);
+  contact_.detect(bodies_, this->config_, time_, dt_, false, profiler_);
 }
 
 template <Real Scalar, class Layout>

@@ -9,11 +9,18 @@
 
 namespace gravel {
 
+/// Bodies that stay where they are for as long as the list is asked to hold.
+struct AtRest {};
+
 /// Keeps the pairs of one search for as long as they are certain to hold every pair within reach. They are
 /// always a superset of what a fresh search would give, so that the skin has no say in any result.
 ///
 /// In a shear-periodic box displacements are measured against the flow -(3/2) Omega x, in whose frame the
 /// images stand still, and what the flow itself can bring a touching pair nearer is taken off the skin.
+///
+/// A list can be asked to hold for a whole step, along straight ways whose ends are known. A few bodies that
+/// leave their half of the skin, bullets among grains, do not spoil it: each of them is compared with all
+/// others, until a new search is cheaper.
 template <Real S>
 class NeighbourList {
  public:
@@ -21,21 +28,61 @@ class NeighbourList {
   /// \param revision any number that changes whenever indices come to name other bodies
   /// \param margin [m] >= 0
   /// \throws std::invalid_argument for positions or radii that are not finite, negative radii or margin
-  template <class Positions, class Radii, class Ids>
+  /// \param travel  `travel(i)`: way [m] of body i while the list is to hold; `AtRest` for none
+  template <class Positions, class Radii, class Ids, class Travel = AtRest>
   const std::vector<Pair>& update(const Positions& positions, const Radii& radii, const Ids& ids,
                                   std::uint64_t revision, const Domain<S>& domain, const S& time,
-                                  const S& margin = S(0)) {
+                                  const S& margin = S(0), const Travel& travel = {}) {
     detail::require("margin of a neighbour list", margin, detail::nonNegative<S>());
     ++updates_;
-    reason_ = whatIsStale(positions, radii, revision, domain, time, margin);
+    extra_.clear();
+    strays_ = false;
+    reason_ = whatIsStale(positions, radii, revision, domain, time, margin, travel);
     rebuilt_ = reason_ != nullptr;
     if (rebuilt_) {
-      rebuild(positions, radii, ids, revision, domain, time, margin);
+      rebuild(positions, radii, ids, revision, domain, time, margin, travel);
     }
-    return pairs_;
+    for (const std::uint32_t i : swift_) {
+      ++comparisons_;
+      compare(i, positions, radii, ids, wayOf(travel, i), travel, extra_);
+    }
+    join(ids);
+    return pairs();
   }
 
-  const std::vector<Pair>& pairs() const { return pairs_; }
+  const std::vector<Pair>& pairs() const { return extra_.empty() ? pairs_ : joined_; }
+
+  /// A body has taken another course since the update: appends to `out` the pairs that its new way adds to
+  /// those of pairs(). O(1) while it stays in its half of the skin, else O(N).
+  /// \param way [m] from positions[i]
+  template <class Positions, class Radii, class Ids, class Travel>
+  void follow(std::uint32_t i, const Positions& positions, const Radii& radii, const Ids& ids,
+              const Vector3<S>& way, const Travel& travel, std::vector<Pair>& out) {
+    Vector3<S> x = positions[i];
+    x[1] += flow_ * x[0];
+    const S from_sq = domain_.minimumImage(x - places_[i], time_).squaredNorm();
+    x = Vector3<S>(positions[i]) + way;
+    x[1] += flow_ * x[0];
+    const S to_sq = domain_.minimumImage(x - places_[i], time_).squaredNorm();
+    if (!(S(4) * std::max<S>(from_sq, to_sq) <= free_ * free_)) {
+      ++comparisons_;
+      strays_ = true;
+      compare(i, positions, radii, ids, way, travel, out);
+    }
+  }
+
+  /// Adds pairs that follow() found to those of pairs(), until the next update.
+  template <class Ids>
+  void add(const std::vector<Pair>& more, const Ids& ids) {
+    if (!more.empty()) {
+      extra_.insert(extra_.end(), more.begin(), more.end());
+      join(ids);
+    }
+  }
+
+  /// Whether some body was, or is on a way to be, further than half the skin from where the last search saw
+  /// it.
+  bool strays() const { return strays_ || !swift_.empty(); }
 
   /// Whether the last update searched.
   bool rebuilt() const { return rebuilt_; }
@@ -64,10 +111,20 @@ class NeighbourList {
   void clear() { built_ = false; }
 
  private:
-  /// nullptr if the list still holds.
-  template <class Positions, class Radii>
+  template <class Travel>
+  static Vector3<S> wayOf(const Travel& travel, std::size_t i) {
+    if constexpr (std::is_same_v<Travel, AtRest>) {
+      return Vector3<S>::Zero();
+    } else {
+      return travel(i);
+    }
+  }
+
+  /// nullptr if the list still holds, but for the swift.
+  template <class Positions, class Radii, class Travel>
   const char* whatIsStale(const Positions& positions, const Radii& radii, std::uint64_t revision,
-                          const Domain<S>& domain, const S& time, const S& margin) {
+                          const Domain<S>& domain, const S& time, const S& margin, const Travel& travel) {
+    swift_.clear();
     if (!built_) {
       return "first search";
     }
@@ -77,44 +134,104 @@ class NeighbourList {
     if (!(domain == domain_)) {
       return "the domain changed";
     }
-    const S drift = S(1.5) * domain.omega() * (time - time_);
-    const S flow = drift < S(0) ? S(-drift) : drift;
-    const S room = room_ - margin - flow * (S(2) * largest_ + margin);
-    if (room < S(0)) {
+    flow_ = S(1.5) * domain.omega() * (time - time_);
+    const S drift = flow_ < S(0) ? S(-flow_) : flow_;
+    free_ = room_ - margin - drift * (S(2) * largest_ + margin);
+    if (free_ < S(0)) {
       return margin > S(0) ? "the margin grew or the flow used up the skin" : "the flow used up the skin";
     }
-    moved_sq_ = S(0);
     const std::size_t n = places_.size();
-    parts_.assign((n + chunk - 1) / chunk, S(0));
-    staleRadius_.assign(parts_.size(), 0);
+    parts_.resize((n + chunk - 1) / chunk);
     parallelForChunks(n, chunk, [&](std::size_t begin, std::size_t end) {
-      S furthest(0);
+      Part part;
+      part.swift.swap(parts_[begin / chunk].swift);
+      part.swift.clear();
       for (std::size_t i = begin; i < end; ++i) {
-        staleRadius_[begin / chunk] |= static_cast<unsigned char>(!(radii[i] == radii_[i]));
+        part.otherRadius = part.otherRadius || !(radii[i] == radii_[i]);
         Vector3<S> x = positions[i];
-        x[1] += drift * x[0];
-        const Vector3<S> d = domain.minimumImage(x - places_[i], time_);
-        const S d_sq = d.squaredNorm();
-        if (d_sq > furthest || !isFinite(d_sq)) {  // a NaN stays, for the search to refuse
-          furthest = d_sq;
+        x[1] += flow_ * x[0];
+        S d_sq = domain.minimumImage(x - places_[i], time_).squaredNorm();
+        if constexpr (!std::is_same_v<Travel, AtRest>) {
+          x = Vector3<S>(positions[i]) + Vector3<S>(travel(i));
+          x[1] += flow_ * x[0];
+          d_sq = std::max<S>(d_sq, domain.minimumImage(x - places_[i], time_).squaredNorm());
+        }
+        if (!(S(4) * d_sq <= free_ * free_)) {  // a NaN too, for the search to refuse
+          part.swift.push_back(static_cast<std::uint32_t>(i));
+          part.lost = part.lost || !isFinite(d_sq);
+        } else if (d_sq > part.moved_sq) {
+          part.moved_sq = d_sq;
         }
       }
-      parts_[begin / chunk] = furthest;
+      parts_[begin / chunk] = std::move(part);
     });
-    for (std::size_t c = 0; c < parts_.size(); ++c) {
-      if (staleRadius_[c] != 0) {
+    moved_sq_ = S(0);
+    for (const Part& part : parts_) {
+      if (part.otherRadius) {
         return "a radius changed";
       }
-      if (parts_[c] > moved_sq_ || !isFinite(parts_[c])) {
-        moved_sq_ = parts_[c];
+      if (part.lost) {
+        return "a place is not finite";
       }
+      moved_sq_ = std::max<S>(moved_sq_, part.moved_sq);
+      swift_.insert(swift_.end(), part.swift.begin(), part.swift.end());
     }
-    return S(4) * moved_sq_ <= room * room ? nullptr : "a body moved half the skin";
+    if (comparisons_ + swift_.size() <= mostComparisons && swift_.size() <= mostSwift(n)) {
+      return nullptr;
+    }
+    moved_sq_ = std::max<S>(moved_sq_, free_ * free_ / S(4));
+    return "bodies moved half the skin";
   }
 
-  template <class Positions, class Radii, class Ids>
+  /// Appends the pairs of body i on its way, with others on theirs.
+  template <class Positions, class Radii, class Ids, class Travel>
+  void compare(std::uint32_t i, const Positions& positions, const Radii& radii, const Ids& ids,
+               const Vector3<S>& way, const Travel& travel, std::vector<Pair>& out) const {
+    const Vector3<S> x = positions[i];
+    const S length_sq = way.squaredNorm();
+    const S r_i = radii[i];
+    const std::uint64_t id = detail::idKey(ids[i]);
+    const S slack = room_ - skin_;
+    for (std::uint32_t j = 0; j < positions.size(); ++j) {
+      const S radii_ij = r_i + radii[j];
+      if (j == i || !(radii_ij > S(0))) {
+        continue;
+      }
+      using std::sqrt;
+      const S far = S(sqrt(wayOf(travel, j).squaredNorm()));
+      const S reach = radii_ij + slack + far + far;
+      const Vector3<S> r = domain_.minimumImage(Vector3<S>(positions[j]) - x, time_);
+      // The nearest point of the way: x + way s, 0 <= s <= 1.
+      const S s = length_sq > S(0) ? std::min<S>(S(1), std::max<S>(S(0), S(way.dot(r) / length_sq))) : S(0);
+      if (Vector3<S>(r - s * way).squaredNorm() <= reach * reach * (S(1) + S(16) * roundoff())) {
+        if (id < detail::idKey(ids[j])) {
+          out.push_back({i, j});
+        } else {
+          out.push_back({j, i});
+        }
+      }
+    }
+  }
+
+  /// pairs_ and extra_ in one list, in the order of ids.
+  template <class Ids>
+  void join(const Ids& ids) {
+    if (extra_.empty()) {
+      return;
+    }
+    const auto keys = [&](const Pair& pair) {
+      return std::pair(detail::idKey(ids[pair.first]), detail::idKey(ids[pair.second]));
+    };
+    const auto before = [&](const Pair& a, const Pair& b) { return keys(a) < keys(b); };
+    std::sort(extra_.begin(), extra_.end(), before);
+    joined_.resize(pairs_.size() + extra_.size());
+    std::merge(pairs_.begin(), pairs_.end(), extra_.begin(), extra_.end(), joined_.begin(), before);
+    joined_.erase(std::unique(joined_.begin(), joined_.end()), joined_.end());
+  }
+
+  template <class Positions, class Radii, class Ids, class Travel>
   void rebuild(const Positions& positions, const Radii& radii, const Ids& ids, std::uint64_t revision,
-               const Domain<S>& domain, const S& time, const S& margin) {
+               const Domain<S>& domain, const S& time, const S& margin, const Travel& travel) {
     const std::size_t n = positions.size();
     const bool motionSeen = built_ && revision == revision_ && n == places_.size() && isFinite(moved_sq_);
     built_ = false;  // stays so if the search throws
@@ -132,6 +249,13 @@ class NeighbourList {
     }
     const S mean = spheres == 0 ? S(0) : S(sum / S(static_cast<double>(spheres)));
     skin_ = fixedSkin_ ? *fixedSkin_ : chooseSkin(mean, motionSeen);
+    swift_.clear();
+    if constexpr (!std::is_same_v<Travel, AtRest>) {
+      skin_ = std::max<S>(skin_, takeSwift(n, travel));
+    }
+    free_ = skin_;
+    flow_ = S(0);
+    comparisons_ = 0;
     room_ = margin + skin_;
     // Distances at both times and the displacement are rounded: a few units of what is subtracted.
     S scale = S(2) * largest_ + room_;
@@ -145,6 +269,40 @@ class NeighbourList {
     time_ = time;
     updates_ = 0;
     built_ = true;
+  }
+
+  /// The bodies that may outrun any skin, at most mostSwift(n) of them, fastest first.
+  /// \return [m] twice the way of the next one
+  template <class Travel>
+  S takeSwift(std::size_t n, const Travel& travel) {
+    using std::sqrt;
+    ways_.resize(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      ways_[i] = wayOf(travel, i).squaredNorm();
+      if (!isFinite(ways_[i])) {
+        return S(0);  // the search will say which
+      }
+    }
+    if (n == 0) {
+      return S(0);
+    }
+    order_.resize(n);
+    std::iota(order_.begin(), order_.end(), 0U);
+    const std::size_t most = std::min(mostSwift(n), n - 1);
+    const auto faster = [&](std::uint32_t a, std::uint32_t b) {
+      return ways_[a] > ways_[b] || (ways_[a] == ways_[b] && a < b);
+    };
+    std::nth_element(order_.begin(), order_.begin() + static_cast<std::ptrdiff_t>(most), order_.end(),
+                     faster);
+    const S enough = S(2) * S(sqrt(ways_[order_[most]]));
+    const S skin = std::max<S>(skin_, enough);
+    for (std::size_t k = 0; k < most; ++k) {
+      if (S(4) * ways_[order_[k]] > skin * skin) {
+        swift_.push_back(order_[k]);
+      }
+    }
+    std::sort(swift_.begin(), swift_.end());
+    return enough;
   }
 
   /// So thick that the list would have held for `goodLife` updates of the motion last seen, within a fraction
@@ -170,23 +328,41 @@ class NeighbourList {
   }
 
   static constexpr std::size_t chunk = 8192;
+  /// A search costs about as much as this many comparisons of one body with all others.
+  static constexpr std::size_t mostComparisons = 128;
+  static std::size_t mostSwift(std::size_t n) { return std::min<std::size_t>(8, n / 64); }
+
+  struct Part {
+    S moved_sq = S(0);
+    bool otherRadius = false;
+    bool lost = false;
+    std::vector<std::uint32_t> swift;
+  };
 
   BroadPhase<S> search_;
   std::vector<Pair> pairs_;
   std::vector<Vector3<S>> places_;  ///< at the last search
   std::vector<S> radii_;
-  std::vector<S> parts_;
-  std::vector<unsigned char> staleRadius_;
+  std::vector<Part> parts_;
+  std::vector<std::uint32_t> swift_;  ///< bodies that may leave their half of the skin
+  std::vector<Pair> extra_;           ///< their pairs
+  std::vector<Pair> joined_;          ///< pairs_ and extra_
+  std::vector<S> ways_;
+  std::vector<std::uint32_t> order_;
+  std::size_t comparisons_ = 0;  ///< of one body with all others since the last search
   Domain<S> domain_;
   S time_ = S(0);
   S largest_ = S(0);
   S skin_ = S(0);
   S room_ = S(0);  ///< margin and skin of the last search
+  S free_ = S(0);  ///< what is left of the skin
+  S flow_ = S(0);  ///< [1] shear since the last search
   S moved_sq_ = S(0);
   std::optional<S> fixedSkin_;
   std::uint64_t revision_ = 0;
   std::uint64_t updates_ = 0;  ///< since the last search
   const char* reason_ = nullptr;
+  bool strays_ = false;
   bool built_ = false;
   bool rebuilt_ = false;
 };

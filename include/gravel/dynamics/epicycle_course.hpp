@@ -1,0 +1,69 @@
+#pragma once
+
+/// \file
+/// Impacts on the way along epicycles.
+
+#include <gravel/contact/impact_events.hpp>
+#include <gravel/dynamics/epicycle.hpp>
+
+#include <array>
+#include <vector>
+
+namespace gravel {
+
+/// The course of bodies in Hill's frame, for `ImpactEvents`. Over a step the epicycle is taken as the
+/// parabola with its ends and its change of velocity, which is right to O(h^3). The drift is linear in (x,
+/// v), so that what a blow dv at t changes at the start of the step is the epicycle back over t of (0, dv),
+/// exactly.
+template <Real Scalar>
+class EpicycleCourse {
+ public:
+  EpicycleCourse(const HillFrame<Scalar>& frame, const Scalar& h) : frame_(frame), h_(h), drift_(frame, h) {}
+
+  /// Must be called once the velocities are those of the drift's start.
+  template <class B>
+  void foresee(const B& bodies) {
+    motion_.resize(bodies.size());
+    parallelFor(bodies.size(), 2048, [&](std::size_t i) { renew(bodies, i); });
+  }
+
+  template <class B>
+  Vector3<Scalar> velocity(const B&, std::size_t i) const {
+    return motion_[i].v;
+  }
+  template <class B>
+  Vector3<Scalar> acceleration(const B& bodies, std::size_t i) const {
+    return motion_[i].a + Vector3<Scalar>(bodies.accelerations()[i]);
+  }
+
+  template <class B>
+  void push(B& bodies, std::size_t i, const Scalar& share, const std::array<Vector3<Scalar>, 3>& strokes,
+            const Scalar& t) {
+    const Vector3<Scalar> blow = share * Vector3<Scalar>(strokes[0] + strokes[1] + strokes[2]);
+    Vector3<Scalar> dx, dv;
+    Epicycle<Scalar>(frame_, Scalar(-t)).increments(Vector3<Scalar>::Zero(), blow, dx, dv);
+    bodies.positions()[i] += dx;
+    bodies.velocities()[i] += blow + dv;
+    renew(bodies, i);
+  }
+
+ private:
+  struct Motion {
+    Vector3<Scalar> v;
+    Vector3<Scalar> a;
+  };
+
+  template <class B>
+  void renew(const B& bodies, std::size_t i) {
+    Vector3<Scalar> dx, dv;
+    drift_.increments(bodies.positions()[i], bodies.velocities()[i], dx, dv);
+    motion_[i] = {dx / h_, dv / h_};
+  }
+
+  HillFrame<Scalar> frame_;
+  Scalar h_;
+  Epicycle<Scalar> drift_;
+  std::vector<Motion> motion_;
+};
+
+}  // namespace gravel
