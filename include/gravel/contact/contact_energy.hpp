@@ -58,6 +58,11 @@ class ContactEnergy {
     return {row.jn * v_n, row.jt.dot(Vector3<S>(detail::slipVelocity(row, b1, b2) + drift))};
   }
 
+  static Vector3<S> driftOf(const ContactProblem<S>& problem, std::span<const Contact<S>> contacts,
+                            const Row& row) {
+    return problem.drifting ? problem.speedIn(contacts[row.contact].drift) : Vector3<S>(Vector3<S>::Zero());
+  }
+
   Sums losses(const ContactProblem<S>& problem, std::span<const Contact<S>> contacts) const {
     return orderedSum(problem.rows.size(), chunk, Sums(Sums::Zero()),
                       [&](std::size_t begin, std::size_t end) {
@@ -67,7 +72,7 @@ class ContactEnergy {
                           if (!(row.jn > S(0))) {
                             continue;
                           }
-                          const Vector3<S> drift = problem.speedIn(contacts[row.contact].drift);
+                          const Vector3<S> drift = driftOf(problem, contacts, row);
                           const Rates before = power(row, problem.initial, drift, problem.friction);
                           const Rates after = power(row, problem.bodies, drift, problem.friction);
                           const S normal = (before.normal + after.normal) / S(2);
@@ -98,7 +103,7 @@ class ContactEnergy {
       if (!(row.jn > S(0))) {
         continue;
       }
-      const Vector3<S> drift = problem.speedIn(contacts[row.contact].drift);
+      const Vector3<S> drift = driftOf(problem, contacts, row);
       const Rates before = power(row, problem.initial, drift, problem.friction);
       const Rates after = power(row, problem.bodies, drift, problem.friction);
       const S a = before.normal + before.tangential;

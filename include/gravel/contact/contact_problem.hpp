@@ -27,20 +27,21 @@ struct SolverRow {
   Vector3<S> n;
   S c1;  ///< arm / radius
   S c2;
-  S normalMass;           ///< 1/(1/m1 + 1/m2)
-  S tangentialMass;       ///< 1/(1/m1 (1 + c1^2/k1) + 1/m2 (1 + c2^2/k2))
-  S target;               ///< v_n after the blow is at least this
-  Vector3<S> slipTarget;  ///< slip after a blow that sticks
+  S normalMass;      ///< 1/(1/m1 + 1/m2)
+  S tangentialMass;  ///< 1/(1/m1 (1 + c1^2/k1) + 1/m2 (1 + c2^2/k2))
+  S target;          ///< v_n after the blow is at least this
   S staticFriction;
   S kineticFriction;
   S jn;
   Vector3<S> jt;
+  S stepN;  ///< of the impulses, from sweep to sweep
+  Vector3<S> stepT;
   std::uint32_t slot1;
   std::uint32_t slot2;
   std::uint32_t contact;
   bool impact;
-  std::uint32_t slides;  ///< how often it went from sticking to sliding
   bool sliding;
+  std::uint8_t slides;  ///< how often it went from sticking to sliding
 };
 
 template <Real S>
@@ -97,32 +98,51 @@ class ContactProblem {
   using Body = detail::SolverBody<S>;
   using Row = detail::SolverRow<S>;
 
-  std::vector<Body> bodies;   ///< by slot; the last one is the boundary, at rest
-  std::vector<Body> initial;  ///< the same before any impulse
-  std::vector<Row> rows;      ///< in the colouring's order
-  bool friction = false;      ///< any contact with friction
-  bool active = false;        ///< any contact that approaches faster than it may
-  S largestApproach = S(0);   ///< largest change of a normal velocity that a contact asks for
+  std::vector<Body> bodies;             ///< by slot; the last one is the boundary, at rest
+  std::vector<Body> initial;            ///< the same before any impulse
+  std::vector<Row> rows;                ///< in the colouring's order
+  std::vector<Vector3<S>> slipTargets;  ///< slip after a blow that sticks, by row; empty if zero for all
+  bool friction = false;                ///< any contact with friction
+  bool drifting = false;                ///< any contact whose second side drifts
+  bool active = false;                  ///< any contact that approaches faster than it may
+  S largestApproach = S(0);             ///< largest change of a normal velocity that a contact asks for
 
   /// \param dt [s] step that these contacts stand for, >= 0
+  /// \param fresh contacts are others, or elsewhere, than at the last call
   template <ContactBodies B>
   void gather(std::span<const Contact<S>> contacts, const B& source, const ContactColoring& colouring,
-              const S& dt, const ContactSettings<S>& settings) {
-    friction = std::any_of(contacts.begin(), contacts.end(),
-                           [](const Contact<S>& c) { return c.material.staticFriction > S(0); });
+              const S& dt, const ContactSettings<S>& settings, bool fresh = true) {
+    if (fresh) {
+      friction = std::any_of(contacts.begin(), contacts.end(),
+                             [](const Contact<S>& c) { return c.material.staticFriction > S(0); });
+    }
+    const int massExponent = massExponent_;
     gatherBodies(source, colouring);
+    fresh = fresh || massExponent != massExponent_ || rows.size() != contacts.size();
     rows.resize(contacts.size());
-    std::vector<S> approach((rows.size() + chunk - 1) / chunk, S(0));
+    const bool slips = friction && std::any_of(contacts.begin(), contacts.end(), [](const Contact<S>& c) {
+                         return c.material.tangentialRestitution > S(0) || !(c.drift == Vector3<S>::Zero());
+                       });
+    drifting = slips || std::any_of(contacts.begin(), contacts.end(),
+                                    [](const Contact<S>& c) { return !(c.drift == Vector3<S>::Zero()); });
+    slipTargets.assign(slips ? rows.size() : 0, Vector3<S>::Zero());
+    approach_.assign((rows.size() + chunk - 1) / chunk, S(0));
     parallelForChunks(rows.size(), chunk, [&](std::size_t begin, std::size_t end) {
+      S most(0);
       for (std::size_t k = begin; k < end; ++k) {
         const ContactColoring::Row& place = colouring.rows()[k];
-        fill(rows[k], contacts[place.contact], place, source, dt, settings);
+        const Contact<S>& contact = contacts[place.contact];
+        if (fresh) {
+          fill(rows[k], contact, place, source);
+        }
+        aim(k, contact, dt, settings);
         const S excess =
             rows[k].target - detail::normalVelocity(rows[k], bodies[place.slot1], bodies[place.slot2]);
-        approach[begin / chunk] = std::max<S>(approach[begin / chunk], excess);
+        most = std::max<S>(most, excess);
       }
+      approach_[begin / chunk] = most;
     });
-    largestApproach = approach.empty() ? S(0) : *std::max_element(approach.begin(), approach.end());
+    largestApproach = approach_.empty() ? S(0) : *std::max_element(approach_.begin(), approach_.end());
     active = largestApproach > S(0);
   }
 
@@ -163,6 +183,7 @@ class ContactProblem {
   void gatherBodies(const B& source, const ContactColoring& colouring) {
     const std::size_t n = colouring.bodies().size();
     bodies.resize(n + 1);
+    accelerations_.resize(n + 1);
     S fastest(0);
     S lightest(0);
     S heaviest(0);
@@ -177,6 +198,7 @@ class ContactProblem {
       if (friction) {
         b.s = r * Vector3<S>(source.angularVelocities()[i]);
       }
+      accelerations_[slot] = movable ? Vector3<S>(source.accelerations()[i]) : Vector3<S>(Vector3<S>::Zero());
       b.inverseMass = movable ? S(source.masses()[i]) : S(0);  // the mass, until its scale is known
       b.spin = movable && r > S(0) && k > S(0) ? S(1) / k : S(0);
       fastest = std::max<S>(fastest, std::max<S>(detail::maxAbs(b.v), detail::maxAbs(b.s)));
@@ -185,6 +207,7 @@ class ContactProblem {
         lightest = lightest > S(0) ? std::min<S>(lightest, b.inverseMass) : b.inverseMass;
       }
     }
+    accelerations_[n] = Vector3<S>::Zero();
     bodies[n] = Body{Vector3<S>::Zero(), S(0), Vector3<S>::Zero(), S(0)};
     speedExponent_ = detail::scaleExponent<S>(fastest, fastest);
     massExponent_ = detail::scaleExponent<S>(lightest, heaviest);
@@ -202,19 +225,15 @@ class ContactProblem {
     initial = bodies;
   }
 
+  /// What stays while bodies and surfaces stay.
   template <class B>
-  void fill(Row& row, const Contact<S>& c, const ContactColoring::Row& place, const B& source, const S& dt,
-            const ContactSettings<S>& settings) const {
+  void fill(Row& row, const Contact<S>& c, const ContactColoring::Row& place, const B& source) const {
     const Body& b1 = bodies[place.slot1];
     const Body& b2 = bodies[place.slot2];
     row.n = c.normal;
     row.slot1 = place.slot1;
     row.slot2 = place.slot2;
     row.contact = place.contact;
-    row.slides = 0;
-    row.sliding = false;
-    row.jn = S(0);
-    row.jt = Vector3<S>::Zero();
     row.c1 = ratio(c.arm1, source.radii()[c.first]);
     row.c2 = c.second == staticPartner ? S(0) : ratio(c.arm2, source.radii()[c.second]);
     row.normalMass = inverse(b1.inverseMass + b2.inverseMass);
@@ -222,13 +241,26 @@ class ContactProblem {
         inverse(b1.inverseMass + b2.inverseMass + row.c1 * row.c1 * b1.spin + row.c2 * row.c2 * b2.spin);
     row.staticFriction = c.material.staticFriction;
     row.kineticFriction = c.material.kineticFriction;
+  }
 
-    const Vector3<S> drift = speedIn(c.drift);
+  /// What the present velocities ask for.
+  void aim(std::size_t k, const Contact<S>& c, const S& dt, const ContactSettings<S>& settings) {
+    Row& row = rows[k];
+    row.slides = 0;
+    row.sliding = false;
+    row.jn = S(0);
+    row.jt = Vector3<S>::Zero();
+    row.stepN = S(0);
+    row.stepT = Vector3<S>::Zero();
+    const Body& b1 = bodies[row.slot1];
+    const Body& b2 = bodies[row.slot2];
+    const Vector3<S> drift = drifting ? speedIn(c.drift) : Vector3<S>(Vector3<S>::Zero());
     const S drift_n = row.n.dot(drift);
     const S v_n = detail::normalVelocity(row, b1, b2) + drift_n;
-    const S threshold = speedIn(settings.restitutionThreshold + S(2) * relativeAcceleration(c, source) * dt);
+    const S a_n = row.n.dot(Vector3<S>(accelerations_[row.slot2] - accelerations_[row.slot1]));
+    const S threshold = speedIn(settings.restitutionThreshold + S(2) * (a_n < S(0) ? S(-a_n) : a_n) * dt);
     const S allowed =
-        c.gap > S(0) ? (dt > S(0) ? speedIn(c.gap / dt) : Eigen::NumTraits<S>::highest()) : S(0);
+        c.gap > S(0) ? (dt > S(0) ? speedIn(S(c.gap / dt)) : Eigen::NumTraits<S>::highest()) : S(0);
     const S speed = v_n < S(0) ? S(-v_n) : v_n;
     const bool impact = v_n < S(0) && speed > threshold && speed > allowed;
     row.impact = impact;  // booked otherwise than what rests, by who integrates in time
@@ -237,33 +269,25 @@ class ContactProblem {
     // is pushed back by others may so come to approach, and bounces in its turn in the next step; to stop it
     // here would make energy: J_n (v_n^- + v_n^+) > 0.
     row.target = impact || parts
-                     ? -restitutionAt<S>(c.material, detail::scaled<S>(speed, -speedExponent_)) * v_n
+                     ? S(-restitutionAt(c.material, detail::scaled<S>(speed, -speedExponent_)) * v_n)
                      : S(0);
     row.target = impact ? row.target : std::min<S>(row.target, -allowed);
     row.target -= drift_n;
-    row.slipTarget = drift_n * row.n - drift;
-    if (friction && impact && c.material.tangentialRestitution > S(0)) {
-      const Vector3<S> slip = detail::slipVelocity(row, b1, b2) - row.slipTarget;
-      row.slipTarget -= c.material.tangentialRestitution * slip;
+    if (!slipTargets.empty()) {
+      Vector3<S>& slipTarget = slipTargets[k];
+      slipTarget = drift_n * row.n - drift;
+      if (impact && c.material.tangentialRestitution > S(0)) {
+        const Vector3<S> slip = detail::slipVelocity(row, b1, b2) - slipTarget;
+        slipTarget -= c.material.tangentialRestitution * slip;
+      }
     }
   }
 
   static S inverse(const S& x) { return x > S(0) ? S(1) / x : S(0); }
   static S ratio(const S& arm, const S& radius) { return radius > S(0) ? arm / radius : S(0); }
 
-  /// |a_rel.n| of the movable ends.
-  template <class B>
-  static S relativeAcceleration(const Contact<S>& c, const B& source) {
-    S a(0);
-    if (detail::isMovable(source, c.first)) {
-      a -= c.normal.dot(Vector3<S>(source.accelerations()[c.first]));
-    }
-    if (c.second != staticPartner && detail::isMovable(source, c.second)) {
-      a += c.normal.dot(Vector3<S>(source.accelerations()[c.second]));
-    }
-    return a < S(0) ? S(-a) : a;
-  }
-
+  std::vector<Vector3<S>> accelerations_;  ///< [m s^-2] by slot, of the movable
+  std::vector<S> approach_;
   int speedExponent_ = 0;
   int massExponent_ = 0;
 };

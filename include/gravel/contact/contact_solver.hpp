@@ -49,27 +49,32 @@ class ContactSolver {
   }
 
   /// Takes the contacts of a step and colours them; solve() and correctPositions() follow in either order.
-  /// \param contacts sorted by keys; kept as a view, whose geometry may be renewed before solve()
+  /// What the last contacts are remembered by is handed on to those with the same keys. \param contacts
+  /// sorted by keys; kept as a view, whose geometry may be renewed before solve()
   template <ContactBodies B>
   void begin(std::span<const Contact<S>> contacts, const B& bodies) {
     contacts_ = contacts;
-    impulses_.clear();
-    coloring_.build(contacts, bodies);
+    fresh_ = true;
+    if (!sameAsBefore(contacts, bodies)) {
+      coloring_.build(contacts, bodies);
+      handOn(contacts);
+    }
   }
 
   /// The contacts of begin(), at the place where they stand now: after they, or what owns them, were copied.
   void rebind(std::span<const Contact<S>> contacts) { contacts_ = contacts; }
 
   /// Changes the velocities (and, where there is friction, the spins) of the bodies so that every contact
-  /// of begin() obeys restitution and Coulomb's law.
+  /// of begin() obeys restitution and Coulomb's law. A second call takes the contacts to be where they were.
   /// \param dt [s] >= 0, the step for which the contacts stand
   template <ContactBodies B>
   ContactReport<S> solve(B& bodies, const S& dt) {
     const std::span<const Contact<S>> contacts = contacts_;
-    impulses_.assign(contacts.size(), ContactImpulse<S>{});
     ContactReport<S> report;
+    bool solved = false;
     if (!contacts.empty()) {
-      problem_.gather(contacts, bodies, coloring_, dt, settings_);
+      problem_.gather(contacts, bodies, coloring_, dt, settings_, fresh_);
+      fresh_ = false;
       if (problem_.active) {
         guess(dt);
         report = std::visit([&](auto& algorithm) { return algorithm.solve(problem_, coloring_, settings_); },
@@ -77,11 +82,15 @@ class ContactSolver {
         energy_.settle(problem_, coloring_, contacts, report);
         problem_.scatter(bodies, coloring_);
         takeImpulses();
+        solved = true;
       }
+    }
+    if (!solved) {
+      impulses_.assign(contacts.size(), ContactImpulse<S>{});
     }
     report.contacts = contacts.size();
     report.colours = coloring_.colours() + (coloring_.loneCount() > 0 ? 1U : 0U);
-    remember(dt);
+    memoryStep_ = dt;
     return report;
   }
 
@@ -107,69 +116,106 @@ class ContactSolver {
 
   /// What the next solve() begins from: the impulses of the last one by keys, and its step [s]. A restart
   /// that puts them back continues with the same bits.
-  const std::vector<StoredImpulse<S>>& memory() const { return memory_; }
+  std::vector<StoredImpulse<S>> memory() const {
+    std::vector<StoredImpulse<S>> memory;
+    for (std::size_t k = 0; k < names_.size() && settings_.warmStart; ++k) {
+      if (impulses_[k].normal > S(0)) {
+        memory.push_back({names_[k].keys.first, names_[k].keys.second, impulses_[k]});
+      }
+    }
+    return memory;
+  }
   const S& memoryStep() const { return memoryStep_; }
   /// \param memory sorted by keys
-  void setMemory(std::vector<StoredImpulse<S>> memory, const S& step) {
-    memory_ = std::move(memory);
+  void setMemory(const std::vector<StoredImpulse<S>>& memory, const S& step) {
+    names_.clear();
+    impulses_.clear();
+    for (const StoredImpulse<S>& stored : memory) {
+      names_.push_back({{stored.key1, stored.key2}, staticPartner, staticPartner});
+      impulses_.push_back(stored.impulse);
+    }
     memoryStep_ = step;
   }
-  void forget() { memory_.clear(); }
+  void forget() { std::fill(impulses_.begin(), impulses_.end(), ContactImpulse<S>{}); }
 
  private:
+  /// A contact as it is recognised.
+  struct Name {
+    ContactKeys keys;
+    std::uint32_t first;
+    std::uint32_t second;
+
+    friend bool operator==(const Name&, const Name&) = default;
+  };
+
+  static Name nameOf(const Contact<S>& c) { return {{c.key1, c.key2}, c.first, c.second}; }
+
+  /// The same pairs of the same bodies: colours, and who is remembered, stay.
+  template <class B>
+  bool sameAsBefore(std::span<const Contact<S>> contacts, const B& bodies) const {
+    if (contacts.size() != names_.size() || contacts.size() != coloring_.rows().size()) {
+      return false;
+    }
+    for (std::size_t k = 0; k < contacts.size(); ++k) {
+      if (!(names_[k] == nameOf(contacts[k]))) {
+        return false;
+      }
+    }
+    for (std::uint32_t slot = 0; slot < coloring_.bodies().size(); ++slot) {
+      if (coloring_.movable(slot) != detail::isMovable(bodies, coloring_.bodies()[slot])) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  void handOn(std::span<const Contact<S>> contacts) {
+    before_.swap(impulses_);
+    impulses_.assign(contacts.size(), ContactImpulse<S>{});
+    std::size_t m = 0;
+    for (std::size_t k = 0; k < contacts.size() && m < names_.size(); ++k) {
+      const ContactKeys keys{contacts[k].key1, contacts[k].key2};
+      while (m < names_.size() && names_[m].keys < keys) {
+        ++m;
+      }
+      if (m < names_.size() && names_[m].keys == keys) {
+        impulses_[k] = before_[m];
+      }
+    }
+    names_.resize(contacts.size());
+    for (std::size_t k = 0; k < contacts.size(); ++k) {
+      names_[k] = nameOf(contacts[k]);
+    }
+  }
+
   /// First guesses from the last step: forces that last, hence impulses in proportion of the steps.
   void guess(const S& dt) {
-    if (!settings_.warmStart || memory_.empty() || !(memoryStep_ > S(0))) {
+    if (!settings_.warmStart || !(memoryStep_ > S(0))) {
       return;
     }
     const S ratio = dt / memoryStep_;
-    found_.assign(contacts_.size(), none);
-    std::size_t m = 0;
-    for (std::size_t k = 0; k < contacts_.size() && m < memory_.size(); ++k) {
-      while (m < memory_.size() &&
-             (memory_[m].key1 < contacts_[k].key1 ||
-              (memory_[m].key1 == contacts_[k].key1 && memory_[m].key2 < contacts_[k].key2))) {
-        ++m;
+    const std::size_t lone = coloring_.loneCount();
+    parallelFor(problem_.rows.size() - lone, 2048, [&](std::size_t k) {
+      detail::SolverRow<S>& row = problem_.rows[lone + k];
+      const ContactImpulse<S>& last = impulses_[row.contact];
+      if (!(last.normal > S(0))) {
+        return;
       }
-      if (m < memory_.size() && memory_[m].key1 == contacts_[k].key1 &&
-          memory_[m].key2 == contacts_[k].key2) {
-        found_[k] = static_cast<std::uint32_t>(m);
-      }
-    }
-    for (std::size_t k = coloring_.loneCount(); k < problem_.rows.size(); ++k) {
-      detail::SolverRow<S>& row = problem_.rows[k];
-      if (found_[row.contact] == none) {
-        continue;
-      }
-      const ContactImpulse<S>& last = memory_[found_[row.contact]].impulse;
       row.jn = problem_.impulseIn(S(ratio * last.normal));
       if (problem_.friction && row.staticFriction > S(0)) {
         const Vector3<S> jt = problem_.impulseIn(Vector3<S>(ratio * last.tangential));
         row.jt = clampToCone<S>(Vector3<S>(jt - row.n.dot(jt) * row.n), row.jn, row.staticFriction,
                                 row.kineticFriction);
       }
-    }
+    });
   }
 
   void takeImpulses() {
-    for (const detail::SolverRow<S>& row : problem_.rows) {
+    parallelFor(problem_.rows.size(), 2048, [&](std::size_t k) {
+      const detail::SolverRow<S>& row = problem_.rows[k];
       impulses_[row.contact] = {problem_.impulseOut(row.jn), problem_.impulseOut(row.jt), row.impact};
-    }
+    });
   }
-
-  void remember(const S& dt) {
-    memory_.clear();
-    memoryStep_ = dt;
-    if (settings_.warmStart) {
-      for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        if (impulses_[k].normal > S(0)) {
-          memory_.push_back({contacts_[k].key1, contacts_[k].key2, impulses_[k]});
-        }
-      }
-    }
-  }
-
-  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
   std::variant<SequentialImpulses<S>> algorithm_;
   ContactSettings<S> settings_;
@@ -178,10 +224,11 @@ class ContactSolver {
   ContactEnergy<S> energy_;
   PositionalCorrection<S> correction_;
   std::span<const Contact<S>> contacts_;
-  std::vector<ContactImpulse<S>> impulses_;
-  std::vector<StoredImpulse<S>> memory_;
+  std::vector<Name> names_;                  ///< of the contacts of begin(), or of the memory put back
+  std::vector<ContactImpulse<S>> impulses_;  ///< in that order
+  std::vector<ContactImpulse<S>> before_;
   S memoryStep_ = S(0);
-  std::vector<std::uint32_t> found_;
+  bool fresh_ = true;  ///< contacts may be elsewhere than at the last gathering
 };
 
 }  // namespace gravel

@@ -16,7 +16,9 @@ struct CorrectionSettings {
   /// deep overlaps come apart over several steps.
   Scalar cap = Scalar(0.5);
   Scalar tolerance =
-      Scalar(1e-3);        ///< [1] > 0: sweeps end when the largest move is this times the largest overlap
+      Scalar(1e-3);  ///< [1] > 0: sweeps end when the largest move is this times the largest overlap
+  /// [1] >= 0: overlaps that are right to this times the smaller radius are right.
+  Scalar precision = Scalar(1e-4);
   int maxIterations = 20;  ///< >= 1
 };
 
@@ -53,7 +55,13 @@ class PositionalCorrection {
     if (!(report.largestOverlap > S(0)) || !(settings.factor > S(0))) {
       return report;
     }
-    const S enough = settings.tolerance * report.largestOverlap;
+    S enough = settings.tolerance * report.largestOverlap;
+    if (smallest_ > S(0)) {
+      enough = std::max<S>(enough, settings.precision * smallest_);
+    }
+    if (!(report.largestOverlap * settings.factor > settings.precision * smallest_ / S(100))) {
+      return report;  // what resting contacts leave to each other
+    }
     do {
       report.residual = S(0);
       for (std::size_t c = 0; c <= colouring.colours(); ++c) {
@@ -115,6 +123,7 @@ class PositionalCorrection {
       const S r1 = bodies.radii()[c.first];
       const S r2 = boundary ? r1 : S(bodies.radii()[c.second]);
       const S smaller = r1 > S(0) && r2 > S(0) ? std::min<S>(r1, r2) : std::max<S>(r1, r2);
+      smallest_ = k == 0 ? smaller : std::min<S>(smallest_, smaller);
       const S kept =
           std::max<S>(overlap - settings.cap * smaller,
                       std::max<S>((S(1) - settings.factor) * overlap, std::min<S>(settings.slop, overlap)));
@@ -160,6 +169,9 @@ class PositionalCorrection {
         missing = row.reach - n.dot(d);
       } else {
         const Vector3<S> r = row.r + d;
+        if (r.squaredNorm() > row.reach * row.reach) {
+          continue;  // far enough, unless squares underflow
+        }
         const S distance = detail::safeNorm(r);
         missing = row.reach - distance;
         if (distance > Eigen::NumTraits<S>::epsilon() * row.reach) {
@@ -181,6 +193,7 @@ class PositionalCorrection {
   }
 
   std::vector<Shift> shifts_;
+  S smallest_ = S(0);  ///< smallest radius of a contact
   std::vector<Row> rows_;
   std::vector<S> changes_;
   std::vector<Displacement<S>> moved_;

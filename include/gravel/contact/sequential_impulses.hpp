@@ -15,7 +15,9 @@ namespace gravel {
 /// Mazhar et al. 2015, ACM Trans. Graph. 34, 32). Without friction the problem is a convex quadratic one and
 /// the number of sweeps falls to about its square root: a column of 30 takes 100 in place of 2000. With
 /// friction, whose cone follows the normal impulse, full momentum may begin to swing; when the changes have
-/// grown to twice their least, it is held at 0.8. Sweeps have the last word: results obey the cone.
+/// grown to twice their least, it is held at 0.8; and where the least changes so far have not shrunk by a
+/// third in thirty-two sweeps, more of them would wander between the many solutions that friction leaves
+/// open, and it ends: the next step goes on from there. Sweeps have the last word: results obey the cone.
 /// Shares the contacts of a large colour between threads; the same bits for any number of threads.
 /// O(contacts) a sweep.
 template <Real S>
@@ -29,7 +31,7 @@ class SequentialImpulses {
                          const ContactSettings<S>& settings) {
     using std::sqrt;
     ContactReport<S> report;
-    eachOf(0, colouring.loneCount(), [&](std::size_t k) { return strike(problem, problem.rows[k]); });
+    eachOf(0, colouring.loneCount(), [&](std::size_t k) { return strike(problem, k); });
     if (colouring.loneCount() == problem.rows.size()) {
       report.iterations = 1;  // exact
       return report;
@@ -41,13 +43,12 @@ class SequentialImpulses {
     S beta(0);
     S limit(1);
     S leastSize = Eigen::NumTraits<S>::highest();
+    S sizeThen = leastSize;
     int age = 0;
     begin(problem);
     while (true) {
       const Progress now = everyColour(colouring, [&](std::size_t k) {
-        Row& row = problem.rows[k];
-        return friction ? relax<true>(problem, row, steps_[k], beta)
-                        : relax<false>(problem, row, steps_[k], beta);
+        return friction ? relax<true>(problem, k, beta) : relax<false>(problem, k, beta);
       });
       ++report.iterations;
       const S change = sqrt(now.change_sq);
@@ -59,6 +60,12 @@ class SequentialImpulses {
         const S old = beta;
         age = now.along < S(0) ? 0 : age + 1;
         leastSize = std::min<S>(leastSize, now.size);
+        if (friction && report.iterations % stallSweeps == 0) {
+          if (!(leastSize < sizeThen / S(2))) {
+            return report;
+          }
+          sizeThen = leastSize;
+        }
         if (friction && now.size > S(4) * leastSize) {
           limit = S(0.8);
         }
@@ -72,7 +79,8 @@ class SequentialImpulses {
   using Row = detail::SolverRow<S>;
   using Body = detail::SolverBody<S>;
   static constexpr std::size_t chunk = 512;
-  static constexpr std::uint32_t patience = 8;
+  static constexpr std::uint8_t patience = 8;
+  static constexpr int stallSweeps = 32;
 
   /// What a sweep did: largest change of a velocity, squared; and products, over mass, of the changes of the
   /// impulses with the whole step since the sweep before, and with themselves.
@@ -88,11 +96,7 @@ class SequentialImpulses {
     }
   };
 
-  /// Step of a contact's impulse from sweep to sweep; and of a body's velocities.
-  struct Step {
-    S n = S(0);
-    Vector3<S> t = Vector3<S>::Zero();
-  };
+  /// Step of a body's velocities from sweep to sweep.
   struct BodyStep {
     Vector3<S> v;
     Vector3<S> s;
@@ -101,7 +105,6 @@ class SequentialImpulses {
   };
 
   void begin(const ContactProblem<S>& problem) {
-    steps_.assign(problem.rows.size(), Step{});
     bodySteps_.resize(problem.bodies.size());
     parallelFor(problem.bodies.size(), 4 * chunk, [&](std::size_t slot) {
       bodySteps_[slot] = BodyStep{problem.bodies[slot].v, problem.bodies[slot].s};
@@ -186,7 +189,8 @@ class SequentialImpulses {
   }
 
   /// A contact alone: in two strokes, stop and rebound, so that a head-on blow ends at exactly its target.
-  static Progress strike(ContactProblem<S>& problem, Row& row) {
+  static Progress strike(ContactProblem<S>& problem, std::size_t k) {
+    Row& row = problem.rows[k];
     Body& b1 = problem.bodies[row.slot1];
     Body& b2 = problem.bodies[row.slot2];
     const S v_n = detail::normalVelocity(row, b1, b2);
@@ -205,37 +209,37 @@ class SequentialImpulses {
       }
     }
     if (row.staticFriction > S(0)) {
-      Vector3<S> unused = Vector3<S>::Zero();
-      rub(row, b1, b2, unused);
+      rub(problem, k, b1, b2);
     }
     return {};
   }
 
   /// First on along the last step, then to where this contact is right.
   template <bool Friction>
-  static Progress relax(ContactProblem<S>& problem, Row& row, Step& step, const S& beta) {
+  static Progress relax(ContactProblem<S>& problem, std::size_t k, const S& beta) {
+    Row& row = problem.rows[k];
     Body& b1 = problem.bodies[row.slot1];
     Body& b2 = problem.bodies[row.slot2];
-    step.n *= beta;
-    const S jn = row.jn + step.n;
+    row.stepN *= beta;
+    const S jn = row.jn + row.stepN;
     const S next = jn + row.normalMass * (row.target - detail::normalVelocity(row, b1, b2));
     row.jn = next > S(0) ? next : S(0);
     const S dj = row.jn - jn;
-    step.n += dj;
+    row.stepN += dj;
     Progress progress;
     if (dj != S(0)) {
       push(b1, b2, Vector3<S>(dj * row.n));
       const S change = dj / row.normalMass;
       progress.change_sq = change * change;
-      progress.along = step.n * change;
+      progress.along = row.stepN * change;
       progress.size = dj * change;
     }
     if constexpr (Friction) {
       if (row.staticFriction > S(0)) {
-        step.t *= beta;
-        row.jt += step.t;
+        row.stepT *= beta;
+        row.jt += row.stepT;
         if (row.jn > S(0) || row.jt != Vector3<S>::Zero()) {
-          progress += rub(row, b1, b2, step.t);
+          progress += rub(problem, k, b1, b2);
         }
       }
     }
@@ -243,30 +247,33 @@ class SequentialImpulses {
   }
 
   /// Friction of a row for its normal impulse. Sizes are compared as speeds, which are of order one.
-  static Progress rub(Row& row, Body& b1, Body& b2, Vector3<S>& step) {
+  static Progress rub(ContactProblem<S>& problem, std::size_t k, Body& b1, Body& b2) {
     using std::sqrt;
-    const Vector3<S> slip = detail::slipVelocity(row, b1, b2);
-    Vector3<S> jt = row.jt - row.tangentialMass * Vector3<S>(slip - row.slipTarget);
+    Row& row = problem.rows[k];
+    Vector3<S> slip = detail::slipVelocity(row, b1, b2);
+    if (!problem.slipTargets.empty()) {
+      slip -= problem.slipTargets[k];
+    }
+    Vector3<S> jt = row.jt - row.tangentialMass * slip;
     const S mobility = S(1) / row.tangentialMass;
     const S size_sq = Vector3<S>(mobility * jt).squaredNorm();
     // A contact that keeps changing its mind between sticking and sliding slides: sweeps must end.
     const S stick = (row.slides < patience ? row.staticFriction : row.kineticFriction) * row.jn * mobility;
     const bool slides = size_sq > stick * stick;
     if (slides) {
-      row.slides += row.sliding ? 0U : 1U;
+      row.slides = static_cast<std::uint8_t>(row.slides + (row.sliding ? 0U : 1U));
       jt *= row.kineticFriction * row.jn * mobility / S(sqrt(size_sq));
     }
     row.sliding = slides;
     const Vector3<S> dj = jt - row.jt;
     row.jt = jt;
-    step += dj;
+    row.stepT += dj;
     push(b1, b2, dj);
     twist(row, b1, b2, dj);
     const Vector3<S> change = mobility * dj;
-    return {change.squaredNorm(), change.dot(step), change.dot(dj)};
+    return {change.squaredNorm(), change.dot(row.stepT), change.dot(dj)};
   }
 
-  std::vector<Step> steps_;
   std::vector<BodyStep> bodySteps_;
 };
 

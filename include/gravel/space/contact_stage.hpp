@@ -196,6 +196,7 @@ class ContactStage {
   void beginStep() {
     report_ = {};
     firstHalf_.clear();
+    firstHalfKeys_.clear();
     impacts_.clear();
   }
 
@@ -204,7 +205,12 @@ class ContactStage {
   void endFirstHalf(const ForceStage<Scalar, Layout>& force, const Bodies& bodies, const Scalar& kick) {
     if (acted_) {
       bookKick(force, bodies, kick);
-      firstHalf_ = solver_.memory();
+      firstHalf_.clear();
+      firstHalfKeys_.clear();
+      for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        firstHalfKeys_.push_back({contacts_[k].key1, contacts_[k].key2});
+      }
+      firstHalf_.assign(solver_.impulses().begin(), solver_.impulses().end());
     }
   }
 
@@ -227,17 +233,13 @@ class ContactStage {
     std::size_t m = 0;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
       sum.push_back(k < solver_.impulses().size() ? solver_.impulses()[k] : ContactImpulse<Scalar>{});
-      const auto before = [&](const StoredImpulse<Scalar>& stored) {
-        return stored.key1 != contacts_[k].key1 ? stored.key1 < contacts_[k].key1
-                                                : stored.key2 < contacts_[k].key2;
-      };
-      while (m < firstHalf_.size() && before(firstHalf_[m])) {
+      const ContactKeys keys{contacts_[k].key1, contacts_[k].key2};
+      while (m < firstHalf_.size() && firstHalfKeys_[m] < keys) {
         ++m;
       }
-      if (m < firstHalf_.size() && firstHalf_[m].key1 == contacts_[k].key1 &&
-          firstHalf_[m].key2 == contacts_[k].key2) {
-        sum.back().normal += firstHalf_[m].impulse.normal;
-        sum.back().tangential += firstHalf_[m].impulse.tangential;
+      if (m < firstHalf_.size() && firstHalfKeys_[m] == keys) {
+        sum.back().normal += firstHalf_[m].normal;
+        sum.back().tangential += firstHalf_[m].tangential;
       }
     }
     return sum;
@@ -414,7 +416,8 @@ class ContactStage {
   bool searched_ = false;      // neighbours_ hold for the whole drift
   std::vector<Contact<Scalar>> contacts_;
   ContactSolver<Scalar> solver_;
-  std::vector<StoredImpulse<Scalar>> firstHalf_;
+  std::vector<ContactKeys> firstHalfKeys_;
+  std::vector<ContactImpulse<Scalar>> firstHalf_;
   ContactReport<Scalar> report_;
   bool moved_ = false;
   bool acted_ = false;     // the last solve changed velocities
