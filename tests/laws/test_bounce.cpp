@@ -1,9 +1,7 @@
 #include "laws/laws.hpp"
 #include "support/catch.hpp"
 
-// A ball dropped from height h onto a plane: heights h e^(2n), and rest after sqrt(2h/g) (1 + e)/(1 - e). A
-// blow is dealt at the end of the step in which the ball is first inside the plane: up to one step late, so
-// that times and heights err in the first order of dt.
+// A ball dropped from height h onto a plane: heights h e^(2n), and rest after sqrt(2h/g) (1 + e)/(1 - e).
 
 using namespace gravel;
 using namespace gravel::test;
@@ -55,16 +53,6 @@ Drop drop(double e, double dt, double height = 1.0) {
   return result;
 }
 
-/// Mean of |error| over starting heights, so that the luck of where in a step a bounce falls averages out.
-template <class F>
-double meanError(F&& error) {
-  double sum = 0;
-  for (int k = 0; k < 16; ++k) {
-    sum += std::abs(error(1.0 + 0.01 * k));
-  }
-  return sum / 16;
-}
-
 }  // namespace
 
 TEST_CASE("A dropped ball rests after its bounces: no speed, no sinking, no jitter") {
@@ -79,26 +67,102 @@ TEST_CASE("A dropped ball rests after its bounces: no speed, no sinking, no jitt
   }
 }
 
-// Two-sided: the mean error halves with the step. Reached at dt = 1e-3, h = 1 m, in seconds too long:
-// e = 0.3 and 0.5: 0.005 of 0.84 and 1.35; e = 0.9: 0.1 of 8.6, since each of some sixty bounces is late.
-TEST_CASE("The time of all bounces and the height of the first converge in the first order of the step") {
+TEST_CASE("In a uniform field every bounce is at its exact time and height, whatever the step") {
   for (const double e : {0.3, 0.5, 0.9}) {
-    const auto timeError = [&](double dt) {
-      return meanError(
-          [&](double h) { return drop(e, dt, h).time - std::sqrt(2 * h / g) * (1 + e) / (1 - e); });
-    };
-    const auto peakError = [&](double dt) {
-      return meanError([&](double h) { return drop(e, dt, h).firstPeak - e * e * h; });
-    };
-    const double coarse = timeError(4e-3);
-    const double fine = timeError(5e-4);
-    const double high = peakError(4e-3);
-    const double low = peakError(5e-4);
-    CAPTURE(e, coarse, fine, high, low);
-    CHECK_THAT(std::log2(coarse / fine) / 3, WithinAbs(1.0, 0.3));
-    CHECK_THAT(std::log2(high / low) / 3, WithinAbs(1.0, 0.15));
-    CHECK(fine < 0.02 * std::sqrt(2 / g) * (1 + e) / (1 - e));
-    // The blow is up to g-fall of a step late: the peak's error is of the size v dt.
-    CHECK(high < 2 * std::sqrt(2 * g) * 4e-3);
+    for (const double dt : {2e-2, 4e-3, 5e-4}) {
+      for (const double h : {1.0, 1.07}) {
+        SimulationConfig<double> config = plain(dt);
+        config.coeffRestitution = e;
+        Space<double> space(config);
+        space.setUniformField({0, 0, -g});
+        space.addPlane({0, 0, 1}, 0.0);
+        space.addBody(ball({0, 0, radius + h}, {0, 0, 0}, radius));
+        const double first = std::sqrt(2 * h / g);
+        const double end = first * (1 + e) / (1 - e);
+        double settled = 0;
+        double worst = 0;
+        std::size_t bounces = 0;
+        for (std::size_t i = 0; space.time() < end + 3 * dt; ++i) {
+          space.computeDynamics(i);
+          for (const Impact<double>& impact : space.impacts()) {
+            const double t = space.time() - space.getPreviousTimeStep() + impact.time;
+            // After k bounces the next one follows at t_1 (1 + 2 e (1 - e^k)/(1 - e)), at speed v_1 e^k.
+            const double passed = std::pow(e, static_cast<double>(bounces));
+            worst = std::max(worst, std::abs(t - first * (1 + 2 * e * (1 - passed) / (1 - e))));
+            CHECK_THAT(impact.speed, WithinAbs(std::sqrt(2 * g * h) * passed, 1e-11));
+            settled = space.time() - space.getPreviousTimeStep() + impact.settle;
+            ++bounces;
+          }
+        }
+        CAPTURE(e, dt, h, bounces, settled - end);
+        CHECK(bounces > 3);
+        CHECK(worst < 1e-11);
+        CHECK(std::abs(settled - end) < 1e-11);
+        CHECK(space.impacts().empty());
+      }
+    }
   }
+}
+
+namespace {
+
+/// Two spheres that fall on each other and bounce (r0 = 2, touching at 1): errors of the first rebound's
+/// largest distance and of the time of the second impact, whose exact values are those of Kepler's problem.
+struct Rebound {
+  double height = 0;
+  double time = 0;
+};
+
+Rebound rebound(double dt, double start) {
+  SimulationConfig<double> config = plain(dt);
+  config.G = 1;
+  config.coeffRestitution = 0.5;
+  Space<double> space(config);
+  space.addBody(ball({-start / 2, 0, 0}, {0, 0, 0}, 0.5));
+  space.addBody(ball({start / 2, 0, 0}, {0, 0, 0}, 0.5));
+  // mu = 2: v^2 = 4 (1/r - 1/r0); half the period of a radial orbit of height r is pi sqrt(r^3/16).
+  const auto fall = [](double from) {
+    const double x = 1 / from;
+    return std::sqrt(from * from * from / 4) * (std::acos(std::sqrt(x)) + std::sqrt(x * (1 - x)));
+  };
+  const double height = 1 / (1 - 0.25 * (1 - 1 / start));
+  const double second = fall(start) + 2 * fall(height);
+  Rebound error;
+  int hits = 0;
+  double top = 0;
+  for (std::size_t i = 0; hits < 2; ++i) {
+    space.computeDynamics(i);
+    for (const Impact<double>& impact : space.impacts()) {
+      ++hits;
+      if (hits == 2) {
+        error.height = std::abs(top / height - 1);
+        error.time = std::abs(space.time() - space.getPreviousTimeStep() + impact.time - second);
+      }
+    }
+    const double r = space.body(1).position()[0] - space.body(0).position()[0];
+    const double v = space.body(1).velocity()[0] - space.body(0).velocity()[0];
+    top = hits == 1 ? 1 / (1 / r - v * v / 4) : 0;
+  }
+  return error;
+}
+
+Rebound meanRebound(double dt) {
+  Rebound sum;
+  for (int k = 0; k < 32; ++k) {
+    const Rebound one = rebound(dt, 2.0 + 0.0037 * k);
+    sum.height += one.height / 32;
+    sum.time += one.time / 32;
+  }
+  return sum;
+}
+
+}  // namespace
+
+TEST_CASE("A rebound under mutual gravity is of the second order of the step, and right to 1e-6 at 1e-3") {
+  CHECK(rebound(1e-3, 2.0).height < 1e-6);
+  const Rebound coarse = meanRebound(8e-3);
+  const Rebound fine = meanRebound(1e-3);
+  CAPTURE(coarse.height, fine.height, coarse.time, fine.time);
+  CHECK_THAT(std::log2(coarse.height / fine.height) / 3, WithinAbs(2.0, 0.2));
+  CHECK_THAT(std::log2(coarse.time / fine.time) / 3, WithinAbs(2.0, 0.2));
 }

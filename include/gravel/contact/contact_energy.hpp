@@ -47,15 +47,21 @@ class ContactEnergy {
     S tangential;  ///< J_t.v_t
   };
 
-  static Rates power(const Row& row, const std::vector<Body>& bodies, const Vector3<S>& drift,
-                     bool friction) {
+  static Rates power(const ContactProblem<S>& problem, const Row& row, const std::vector<Body>& bodies,
+                     const Vector3<S>& drift) {
     const Body& b1 = bodies[row.slot1];
     const Body& b2 = bodies[row.slot2];
     const S v_n = detail::normalVelocity(row, b1, b2) + row.n.dot(drift);
-    if (!friction || !(row.staticFriction > S(0))) {
-      return {row.jn * v_n, S(0)};
+    S across(0);
+    if (row.staticFriction > S(0)) {
+      across = row.jt.dot(Vector3<S>(detail::slipVelocity(row, b1, b2) + drift));
     }
-    return {row.jn * v_n, row.jt.dot(Vector3<S>(detail::slipVelocity(row, b1, b2) + drift))};
+    if (!problem.turning.empty()) {
+      const detail::TurningRow<S>& turning =
+          problem.turning[static_cast<std::size_t>(&row - problem.rows.data())];
+      across += turning.l.dot(turning.rho(b1, b2));
+    }
+    return {row.jn * v_n, across};
   }
 
   static Vector3<S> driftOf(const ContactProblem<S>& problem, std::span<const Contact<S>> contacts,
@@ -73,8 +79,8 @@ class ContactEnergy {
                             continue;
                           }
                           const Vector3<S> drift = driftOf(problem, contacts, row);
-                          const Rates before = power(row, problem.initial, drift, problem.friction);
-                          const Rates after = power(row, problem.bodies, drift, problem.friction);
+                          const Rates before = power(problem, row, problem.initial, drift);
+                          const Rates after = power(problem, row, problem.bodies, drift);
                           const S normal = (before.normal + after.normal) / S(2);
                           const S tangential = (before.tangential + after.tangential) / S(2);
                           sums[0] -= normal;
@@ -104,8 +110,8 @@ class ContactEnergy {
         continue;
       }
       const Vector3<S> drift = driftOf(problem, contacts, row);
-      const Rates before = power(row, problem.initial, drift, problem.friction);
-      const Rates after = power(row, problem.bodies, drift, problem.friction);
+      const Rates before = power(problem, row, problem.initial, drift);
+      const Rates after = power(problem, row, problem.bodies, drift);
       const S a = before.normal + before.tangential;
       const S b = (after.normal + after.tangential - a) / S(2);
       auto& sum = sums_[islandOf(row, colouring)];
@@ -132,6 +138,9 @@ class ContactEnergy {
       if (beta < S(1)) {
         row.jn *= beta;
         row.jt *= beta;
+        if (!problem.turning.empty()) {
+          problem.turning[static_cast<std::size_t>(&row - problem.rows.data())].l *= beta;
+        }
       }
     }
     for (std::uint32_t slot = 0; slot < colouring.bodies().size(); ++slot) {

@@ -44,6 +44,20 @@ struct SolverRow {
   std::uint8_t slides;  ///< how often it went from sticking to sliding
 };
 
+/// Resistance to rolling and spinning of a row; see resistTurning().
+template <Real S>
+struct TurningRow {
+  S q1 = S(0);  ///< effective radius / radius
+  S q2 = S(0);
+  S mass = S(0);  ///< 1/(q1^2/(k1 m1) + q2^2/(k2 m2))
+  S rolling = S(0);
+  S spinning = S(0);
+  Vector3<S> l = Vector3<S>::Zero();
+  Vector3<S> step = Vector3<S>::Zero();
+
+  Vector3<S> rho(const SolverBody<S>& b1, const SolverBody<S>& b2) const { return q2 * b2.s - q1 * b1.s; }
+};
+
 template <Real S>
 S normalVelocity(const SolverRow<S>& row, const SolverBody<S>& b1, const SolverBody<S>& b2) {
   return row.n.dot(Vector3<S>(b2.v - b1.v));
@@ -102,10 +116,11 @@ class ContactProblem {
   std::vector<Body> initial;            ///< the same before any impulse
   std::vector<Row> rows;                ///< in the colouring's order
   std::vector<Vector3<S>> slipTargets;  ///< slip after a blow that sticks, by row; empty if zero for all
-  bool friction = false;                ///< any contact with friction
-  bool drifting = false;                ///< any contact whose second side drifts
-  bool active = false;                  ///< any contact that approaches faster than it may
-  S largestApproach = S(0);             ///< largest change of a normal velocity that a contact asks for
+  std::vector<detail::TurningRow<S>> turning;  ///< by row; empty if nothing resists rolling or spinning
+  bool friction = false;                       ///< any contact where spin matters
+  bool drifting = false;                       ///< any contact whose second side drifts
+  bool active = false;                         ///< any contact that approaches faster than it may
+  S largestApproach = S(0);  ///< largest change of a normal velocity that a contact asks for
 
   /// \param dt [s] step that these contacts stand for, >= 0
   /// \param fresh contacts are others, or elsewhere, than at the last call
@@ -115,11 +130,17 @@ class ContactProblem {
     if (fresh) {
       friction = std::any_of(contacts.begin(), contacts.end(),
                              [](const Contact<S>& c) { return c.material.staticFriction > S(0); });
+      const bool turns = std::any_of(contacts.begin(), contacts.end(), [](const Contact<S>& c) {
+        return c.material.rollingFriction > S(0) || c.material.spinningFriction > S(0);
+      });
+      friction = friction || turns;
+      turning.resize(turns ? contacts.size() : 0);
     }
     const int massExponent = massExponent_;
     gatherBodies(source, colouring);
     fresh = fresh || massExponent != massExponent_ || rows.size() != contacts.size();
     rows.resize(contacts.size());
+    turning.resize(turning.empty() ? 0 : contacts.size());
     const bool slips = friction && std::any_of(contacts.begin(), contacts.end(), [](const Contact<S>& c) {
                          return c.material.tangentialRestitution > S(0) || !(c.drift == Vector3<S>::Zero());
                        });
@@ -134,6 +155,9 @@ class ContactProblem {
         const Contact<S>& contact = contacts[place.contact];
         if (fresh) {
           fill(rows[k], contact, place, source);
+          if (!turning.empty()) {
+            fill(turning[k], contact, place, source);
+          }
         }
         aim(k, contact, dt, settings);
         const S excess =
@@ -243,6 +267,19 @@ class ContactProblem {
     row.kineticFriction = c.material.kineticFriction;
   }
 
+  template <class B>
+  void fill(detail::TurningRow<S>& row, const Contact<S>& c, const ContactColoring::Row& place,
+            const B& source) const {
+    const S r1 = source.radii()[c.first];
+    const S r2 = c.second == staticPartner ? S(0) : S(source.radii()[c.second]);
+    row.q1 = r2 > S(0) ? S(r2 / (r1 + r2)) : S(1);
+    row.q2 = r2 > S(0) ? S(r1 / (r1 + r2)) : S(0);
+    row.mass =
+        inverse(row.q1 * row.q1 * bodies[place.slot1].spin + row.q2 * row.q2 * bodies[place.slot2].spin);
+    row.rolling = c.material.rollingFriction;
+    row.spinning = c.material.spinningFriction;
+  }
+
   /// What the present velocities ask for.
   void aim(std::size_t k, const Contact<S>& c, const S& dt, const ContactSettings<S>& settings) {
     Row& row = rows[k];
@@ -252,6 +289,9 @@ class ContactProblem {
     row.jt = Vector3<S>::Zero();
     row.stepN = S(0);
     row.stepT = Vector3<S>::Zero();
+    if (!turning.empty()) {
+      turning[k].l = turning[k].step = Vector3<S>::Zero();
+    }
     const Body& b1 = bodies[row.slot1];
     const Body& b2 = bodies[row.slot2];
     const Vector3<S> drift = drifting ? speedIn(c.drift) : Vector3<S>(Vector3<S>::Zero());

@@ -43,6 +43,8 @@ template <Real Scalar>
 struct ContactImpulse {
   Scalar normal = Scalar(0);  ///< >= 0, along Contact::normal
   Vector3<Scalar> tangential = Vector3<Scalar>::Zero();
+  /// Angular impulse against rolling and spinning over the effective radius r1 r2/(r1 + r2).
+  Vector3<Scalar> turning = Vector3<Scalar>::Zero();
   bool impact = false;  ///< came in faster than the threshold, so that restitution acted
 
   friend bool operator==(const ContactImpulse&, const ContactImpulse&) = default;

@@ -207,13 +207,21 @@ class ContactSolver {
         row.jt = clampToCone<S>(Vector3<S>(jt - row.n.dot(jt) * row.n), row.jn, row.staticFriction,
                                 row.kineticFriction);
       }
+      if (!problem_.turning.empty()) {
+        detail::TurningRow<S>& turning = problem_.turning[lone + k];
+        turning.l = resistTurning<S>(problem_.impulseIn(Vector3<S>(ratio * last.turning)), row.n, row.jn,
+                                     turning.rolling, turning.spinning);
+      }
     });
   }
 
   void takeImpulses() {
     parallelFor(problem_.rows.size(), 2048, [&](std::size_t k) {
       const detail::SolverRow<S>& row = problem_.rows[k];
-      impulses_[row.contact] = {problem_.impulseOut(row.jn), problem_.impulseOut(row.jt), row.impact};
+      impulses_[row.contact] = {problem_.impulseOut(row.jn), problem_.impulseOut(row.jt),
+                                problem_.turning.empty() ? Vector3<S>(Vector3<S>::Zero())
+                                                         : problem_.impulseOut(problem_.turning[k].l),
+                                row.impact};
     });
   }
 

@@ -468,6 +468,7 @@ class ImpactEvents {
     S spin = S(0);                      ///< 1/k; 0 if it cannot turn
     bool movable = false;
     S mass = S(0);
+    S r = S(0);
   };
 
   template <class Scene>
@@ -480,6 +481,7 @@ class ImpactEvents {
     side.mass = bodies.masses()[i];
     side.v = scene.velocity(i) + scene.acceleration(i) * (t - scene.settings.h / S(2));
     side.s = r * Vector3<S>(bodies.angularVelocities()[i]);
+    side.r = r;
     side.c = r > S(0) ? S(arm / r) : S(0);
     side.spin = side.movable && r > S(0) && k > S(0) ? S(S(1) / k) : S(0);
     return side;
@@ -561,10 +563,32 @@ class ImpactEvents {
       }
       twist(scene, event.second, share.second * two.c * two.spin, n.cross(dv_t), t);
     }
+    // Resistance to rolling and spinning, for what the blow left of the turn.
+    Vector3<S> l = Vector3<S>::Zero();
+    S turned(0);
+    if (material.rollingFriction > S(0) || material.spinningFriction > S(0)) {
+      const S q1 = boundary ? S(1) : S(two.r / (one.r + two.r));
+      const S q2 = boundary ? S(0) : S(one.r / (one.r + two.r));
+      const S turnMobility = share.first * one.spin * q1 * q1 + share.second * two.spin * q2 * q2;
+      if (turnMobility > S(0)) {
+        const Vector3<S> s1 = one.r * Vector3<S>(bodies.angularVelocities()[event.first]);
+        const Vector3<S> s2 = boundary
+                                  ? Vector3<S>(Vector3<S>::Zero())
+                                  : Vector3<S>(two.r * Vector3<S>(bodies.angularVelocities()[event.second]));
+        const Vector3<S> rho = q2 * s2 - q1 * s1;
+        l = resistTurning<S>(Vector3<S>(rho / -turnMobility), n, dv_n, material.rollingFriction,
+                             material.spinningFriction);
+        turned = l.dot(rho) + turnMobility * l.squaredNorm() / S(2);
+        twist(scene, event.first, share.first * q1 * one.spin, l, t);
+        if (!boundary) {
+          twist(scene, event.second, -share.second * q2 * two.spin, l, t);
+        }
+      }
+    }
     const S& m = share.effective;
     const Vector3<S> slipAfter = slip + mobility * dv_t;
     report.restitutionLoss -= m * dv_n * (v_n + target) / S(2);
-    report.frictionLoss -= m * dv_t.dot(Vector3<S>(slip + slipAfter)) / S(2);
+    report.frictionLoss -= m * (dv_t.dot(Vector3<S>(slip + slipAfter)) / S(2) + turned);
     report.driftWork -= m * Vector3<S>(dv_n * n + dv_t).dot(drift);
     impacts_.push_back({event.first,
                         event.second,
@@ -574,7 +598,7 @@ class ImpactEvents {
                         speed,
                         n,
                         distance,
-                        {m * dv_n, m * dv_t, true},
+                        {m * dv_n, m * dv_t, m * l, true},
                         rests || !(target > S(0)),
                         rests && e < S(1) ? S(t + S(2) * e * speed / ((S(1) - e) * pull)) : t});
     remember(scene, e, report);

@@ -126,4 +126,20 @@ Vector3<Scalar> tangentialImpulse(const Scalar& tangentialMass, const Vector3<Sc
   return clampToCone<Scalar>(sticking, jn, mu_s, mu_k);
 }
 
+/// Rolling and spinning resistance of one blow, or of a step of rest. The relative turn of two bodies,
+/// dw = w2 - w1, is measured as the speed rho = R* dw with the effective radius R* = r1 r2/(r1 + r2), that of
+/// the sphere on a plane; an angular impulse L on body 2 (-L on 1) as L/R* [N s]. In these units, with
+/// s_i = r_i w_i and q_i = R*/r_i, rho = q2 s2 - q1 s1, and an impulse l changes s_i by +-q_i l/(k_i m_i).
+/// The part across the normal is bound by mu_r J_n, that along it by mu_s J_n, each against rho (as in "type
+/// A" of Ai, Chen, Rotter & Ooi 2011, Powder Technol. 206, 269, without elasticity). It never adds energy.
+/// \param wanted [N s] what would stop the relative turn
+template <Real Scalar>
+Vector3<Scalar> resistTurning(const Vector3<Scalar>& wanted, const Vector3<Scalar>& n, const Scalar& jn,
+                              const Scalar& mu_r, const Scalar& mu_s) {
+  const Scalar along = n.dot(wanted);
+  const Scalar most = jn > Scalar(0) ? Scalar(mu_s * jn) : Scalar(0);
+  const Scalar kept = along > most ? most : along < -most ? Scalar(-most) : along;
+  return clampToCone<Scalar>(Vector3<Scalar>(wanted - along * n), jn, mu_r, mu_r) + kept * n;
+}
+
 }  // namespace gravel

@@ -36,7 +36,7 @@ class SequentialImpulses {
       report.iterations = 1;  // exact
       return report;
     }
-    everyColour(colouring, [&](std::size_t k) { return applyGuess(problem, problem.rows[k]); });
+    everyColour(colouring, [&](std::size_t k) { return applyGuess(problem, k); });
     const S rounding = S(8) * Eigen::NumTraits<S>::epsilon();
     const S enough = std::max<S>(settings.tolerance, rounding) * problem.largestApproach;
     const bool friction = problem.friction;
@@ -176,13 +176,17 @@ class SequentialImpulses {
     }
   }
 
-  static Progress applyGuess(ContactProblem<S>& problem, const Row& row) {
+  static Progress applyGuess(ContactProblem<S>& problem, std::size_t k) {
+    const Row& row = problem.rows[k];
     if (row.jn > S(0)) {
       Body& b1 = problem.bodies[row.slot1];
       Body& b2 = problem.bodies[row.slot2];
       push(b1, b2, Vector3<S>(row.jn * row.n + row.jt));
       if (problem.friction) {
         twist(row, b1, b2, row.jt);
+      }
+      if (!problem.turning.empty()) {
+        turn(problem.turning[k], b1, b2, problem.turning[k].l);
       }
     }
     return {};
@@ -210,6 +214,21 @@ class SequentialImpulses {
     }
     if (row.staticFriction > S(0)) {
       rub(problem, k, b1, b2);
+    }
+    if (!problem.turning.empty() && problem.turning[k].mass > S(0)) {
+      // Friction and resistance act on one spin: in turns, each taking 2/7 or more off what is left.
+      const S speed =
+          detail::maxAbs(b1.s) + detail::maxAbs(b2.s) + detail::maxAbs(b1.v) + detail::maxAbs(b2.v);
+      const S enough = Eigen::NumTraits<S>::epsilon() * speed;
+      for (int turn = 0; turn < 200; ++turn) {
+        Progress progress = resist(problem, k, b1, b2);
+        if (row.staticFriction > S(0)) {
+          progress += rub(problem, k, b1, b2);
+        }
+        if (!(progress.change_sq > enough * enough)) {
+          break;
+        }
+      }
     }
     return {};
   }
@@ -242,6 +261,11 @@ class SequentialImpulses {
           progress += rub(problem, k, b1, b2);
         }
       }
+      if (!problem.turning.empty()) {
+        problem.turning[k].step *= beta;
+        problem.turning[k].l += problem.turning[k].step;
+        progress += resist(problem, k, b1, b2);
+      }
     }
     return progress;
   }
@@ -272,6 +296,31 @@ class SequentialImpulses {
     twist(row, b1, b2, dj);
     const Vector3<S> change = mobility * dj;
     return {change.squaredNorm(), change.dot(row.stepT), change.dot(dj)};
+  }
+
+  static void turn(const detail::TurningRow<S>& row, Body& b1, Body& b2, const Vector3<S>& l) {
+    if (b1.inverseMass > S(0)) {
+      b1.s -= (row.q1 * b1.spin) * l;
+    }
+    if (b2.inverseMass > S(0)) {
+      b2.s += (row.q2 * b2.spin) * l;
+    }
+  }
+
+  /// Resistance to rolling and spinning of a row for its normal impulse.
+  static Progress resist(ContactProblem<S>& problem, std::size_t k, Body& b1, Body& b2) {
+    detail::TurningRow<S>& row = problem.turning[k];
+    if (!(row.mass > S(0))) {
+      return {};
+    }
+    const Vector3<S> l = resistTurning<S>(Vector3<S>(row.l - row.mass * row.rho(b1, b2)), problem.rows[k].n,
+                                          problem.rows[k].jn, row.rolling, row.spinning);
+    const Vector3<S> dl = l - row.l;
+    row.l = l;
+    row.step += dl;
+    turn(row, b1, b2, dl);
+    const Vector3<S> change = dl / row.mass;
+    return {change.squaredNorm(), change.dot(row.step), change.dot(dl)};
   }
 
   std::vector<BodyStep> bodySteps_;

@@ -240,6 +240,7 @@ class ContactStage {
       if (m < firstHalf_.size() && firstHalfKeys_[m] == keys) {
         sum.back().normal += firstHalf_[m].normal;
         sum.back().tangential += firstHalf_[m].tangential;
+        sum.back().turning += firstHalf_[m].turning;
       }
     }
     return sum;

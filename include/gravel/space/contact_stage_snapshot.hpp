@@ -32,7 +32,8 @@ void ContactStage<Scalar, Layout>::save(SnapshotWriter& out) const {
   for (const StoredImpulse<Scalar>& stored : solver_.memory()) {
     const ContactImpulse<Scalar>& j = stored.impulse;
     keys.insert(keys.end(), {stored.key1, stored.key2});
-    numbers.insert(numbers.end(), {j.normal, j.tangential[0], j.tangential[1], j.tangential[2]});
+    numbers.insert(numbers.end(), {j.normal, j.tangential[0], j.tangential[1], j.tangential[2], j.turning[0],
+                                   j.turning[1], j.turning[2]});
   }
   std::vector<std::uint64_t> names;
   std::vector<Scalar> places;
@@ -75,7 +76,7 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
   const auto keys = in.array<std::uint64_t>("keys of impulses");
   const std::vector<Scalar> impulses = in.array<Scalar>("impulses");
   if (sides.size() != 7 * surfaces.size() || planeNumbers.size() != surfaces.size() + 1 ||
-      impulses.size() != 2 * keys.size() || surfacesOf.empty() || places.size() * 4 != names.size() * 9 ||
+      2 * impulses.size() != 7 * keys.size() || surfacesOf.empty() || places.size() * 4 != names.size() * 9 ||
       pairs.size() * 4 != names.size()) {
     in.fail("holds lists of different lengths");
   }
@@ -107,8 +108,8 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
   }
   std::vector<StoredImpulse<Scalar>> memory(keys.size() / 2);
   for (std::size_t k = 0; k < memory.size(); ++k) {
-    const Scalar* j = &impulses[4 * k];
-    memory[k] = {keys[2 * k], keys[2 * k + 1], {j[0], {j[1], j[2], j[3]}}};
+    const Scalar* j = &impulses[7 * k];
+    memory[k] = {keys[2 * k], keys[2 * k + 1], {j[0], {j[1], j[2], j[3]}, {j[4], j[5], j[6]}}};
   }
   solver_.setMemory(std::move(memory), in.value<Scalar>("step of impulses"));
 }

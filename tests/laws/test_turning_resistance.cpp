@@ -1,0 +1,104 @@
+#include "laws/laws.hpp"
+#include "support/catch.hpp"
+
+// Resistance to rolling and spinning: closed forms of a sphere on a plane.
+
+using namespace gravel;
+using namespace gravel::test;
+
+namespace {
+
+constexpr double g = 9.81;
+
+Space<double> onPlane(double slope, double mu, double rolling, double spinning, double dt, const Vec& v,
+                      const Vec& w) {
+  SimulationConfig<double> config = plain(dt);
+  config.coeffRestitution = 0;
+  config.coeffFriction = config.coeffStaticFriction = mu;
+  config.rollingFriction = rolling;
+  config.spinningFriction = spinning;
+  Space<double> space(config);
+  space.setUniformField({g * std::sin(slope), 0, -g * std::cos(slope)});
+  space.addPlane({0, 0, 1}, 0);
+  space.addBody(ball({0, 0, 0.5}, v, 0.5, 2.0, w));
+  return space;
+}
+
+}  // namespace
+
+TEST_CASE("On an incline a sphere stays while the tangent is below the rolling coefficient, else rolls") {
+  const double mu_r = 0.1;
+  for (const double part : {0.5, 0.98, 1.02, 2.0}) {
+    const double slope = std::atan(part * mu_r);
+    Space<double> space = onPlane(slope, 1.0, mu_r, 0, 1e-3, {0, 0, 0}, {0, 0, 0});
+    advance(space, 1000);
+    const double v = space.body(0).velocity()[0];
+    CAPTURE(part, v);
+    if (part < 1) {
+      CHECK(std::abs(v) < 1e-9);
+    } else {
+      // m a = m g sin - F, I a / R = F R - mu_r R m g cos: a = 5/7 g (sin - mu_r cos)
+      CHECK_THAT(v, WithinRel(5.0 / 7 * g * (std::sin(slope) - mu_r * std::cos(slope)), 1e-6));
+    }
+    CHECK_THAT(space.energyLedger().total(), WithinAbs(0.0, 1e-9 + 2.0 * g * std::cos(slope) * 0.5 * 1.01));
+  }
+}
+
+TEST_CASE("A rolling sphere comes to rest after 7 v^2 / (10 mu_r g), and stays") {
+  const double mu_r = 0.05;
+  const double v = 1.0;
+  const double way = 7 * v * v / (10 * mu_r * g);
+  const auto miss = [&](double dt) {
+    Space<double> space = onPlane(0, 1.0, mu_r, 0, dt, {v, 0, 0}, {0, v / 0.5, 0});
+    space.advanceTo(2.0 * way / v + 0.5);
+    CHECK(space.body(0).velocity().norm() < 1e-12);
+    CHECK(space.body(0).angularVelocity().norm() < 1e-12);
+    return std::abs(space.body(0).position()[0] - way);
+  };
+  CHECK(miss(1e-3) < v * 1e-3);
+  CHECK(miss(1e-3) < 2e-5);  // mu_r g dt^2 and the step in which it stops
+}
+
+TEST_CASE("A sphere that spins about the normal stops after 2 w R / (5 mu g), without moving") {
+  const double mu = 0.02;
+  const double w = 10;
+  Space<double> space = onPlane(0, 0.3, 0, mu, 1e-3, {0, 0, 0}, {0, 0, w});
+  const double end = 2 * w * 0.5 / (5 * mu * g);
+  space.advanceTo(end / 2);
+  CHECK_THAT(space.body(0).angularVelocity()[2], WithinRel(w / 2, 1e-3));
+  space.advanceTo(end * 1.01);
+  CHECK(std::abs(space.body(0).angularVelocity()[2]) < 1e-12);
+  CHECK(space.body(0).position().template head<2>().norm() < 1e-15);
+  const auto ledger = space.energyLedger();
+  CHECK_THAT(ledger.friction, WithinRel(0.5 * 0.4 * 2.0 * 0.25 * w * w, 1e-9));
+}
+
+TEST_CASE("In one blow the resistance is bound by its coefficient and takes the energy that it books") {
+  for (const double mu : {0.01, 10.0}) {
+    SimulationConfig<double> config = plain(1e-2);
+    config.coeffRestitution = 0.5;
+    config.rollingFriction = mu;
+    config.spinningFriction = mu / 2;
+    Space<double> space(config);
+    space.addBody(ball({0, 0, 0}, {1, 0, 0}, 0.5, 1.0, {3, 2, 0}));
+    space.addBody(ball({1.001, 0, 0}, {-1, 0, 0}, 0.25, 2.0, {-1, 0, 4}));
+    space.body(1).position()[0] = 0.751;
+    const double energy = space.energyLedger().total();
+    const Vec spin = space.body(1).angularVelocity() - space.body(0).angularVelocity();
+    space.computeDynamics(0);
+    REQUIRE(space.impacts().size() == 1);
+    const Vec l = space.impacts()[0].impulse.turning;
+    const double jn = space.impacts()[0].impulse.normal;
+    const Vec after = space.body(1).angularVelocity() - space.body(0).angularVelocity();
+    CHECK_THAT(space.energyLedger().total(), WithinRel(energy, 1e-14));
+    const double across = l.tail<2>().norm();
+    if (mu < 1) {
+      CHECK_THAT(across, WithinRel(mu * jn, 1e-13));
+      CHECK_THAT(std::abs(l[0]), WithinRel(mu / 2 * jn, 1e-13));
+      CHECK(after.norm() < spin.norm());
+    } else {
+      CHECK(after.norm() < 1e-13);
+      CHECK(across < mu * jn);
+    }
+  }
+}
