@@ -27,9 +27,10 @@ struct SolverRow {
   Vector3<S> n;
   S c1;  ///< arm / radius
   S c2;
-  S normalMass;      ///< 1/(1/m1 + 1/m2)
-  S tangentialMass;  ///< 1/(1/m1 (1 + c1^2/k1) + 1/m2 (1 + c2^2/k2))
-  S target;          ///< v_n after the blow is at least this
+  S normalMass;          ///< 1/(1/m1 + 1/m2)
+  S tangentialMass;      ///< 1/(1/m1 (1 + c1^2/k1) + 1/m2 (1 + c2^2/k2))
+  S tangentialMobility;  ///< 1/tangentialMass
+  S target;              ///< v_n after the blow is at least this
   S staticFriction;
   S kineticFriction;
   S jn;
@@ -261,8 +262,9 @@ class ContactProblem {
     row.c1 = ratio(c.arm1, source.radii()[c.first]);
     row.c2 = c.second == staticPartner ? S(0) : ratio(c.arm2, source.radii()[c.second]);
     row.normalMass = inverse(b1.inverseMass + b2.inverseMass);
-    row.tangentialMass =
-        inverse(b1.inverseMass + b2.inverseMass + row.c1 * row.c1 * b1.spin + row.c2 * row.c2 * b2.spin);
+    row.tangentialMobility =
+        b1.inverseMass + b2.inverseMass + row.c1 * row.c1 * b1.spin + row.c2 * row.c2 * b2.spin;
+    row.tangentialMass = inverse(row.tangentialMobility);
     row.staticFriction = c.material.staticFriction;
     row.kineticFriction = c.material.kineticFriction;
   }

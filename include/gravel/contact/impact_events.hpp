@@ -251,6 +251,13 @@ class ImpactEvents {
     const std::size_t n = scene.walls.empty() ? 0 : nearWalls ? nearWalls->size() : scene.bodies.size();
     const std::size_t count = bodiesFrom + (n + chunk - 1) / chunk;
     parts_.resize(std::max(parts_.size(), count));
+    // No body gets further from where it starts than |v| h + |a| h^2/8.
+    ways_.resize(scene.bodies.size());
+    const S& h = scene.settings.h;
+    parallelFor(ways_.size(), chunk, [&](std::size_t k) {
+      const auto i = static_cast<std::uint32_t>(k);
+      ways_[k] = h * detail::safeNorm(scene.velocity(i)) + h * h * detail::safeNorm(scene.acceleration(i));
+    });
     parallelForTasks(count, [&](std::size_t c) {
       parts_[c].clear();
       if (c < bodiesFrom) {
@@ -270,21 +277,23 @@ class ImpactEvents {
   }
 
   template <class Scene>
-  static void predictPairs(const Scene& scene, std::span<const Pair> pairs, std::vector<Event>& out) {
-    using std::sqrt;
+  void predictPairs(const Scene& scene, std::span<const Pair> pairs, std::vector<Event>& out) const {
     const S& h = scene.settings.h;
     auto next = scene.held.begin();
     bool placed = false;
     for (const Pair& pair : pairs) {
       const std::uint32_t i = pair.first;
       const std::uint32_t j = pair.second;
-      Vector3<S> drift;
-      const RelativeFlight<S> flight = flightOf(scene, i, j, drift);
       const S reach = S(scene.bodies.radii()[i]) + S(scene.bodies.radii()[j]);
-      // The common cases, before a root is sought: it moves away, or not near enough.
-      const S distance_sq = flight.r.squaredNorm();
-      const S travel = h * S(sqrt(flight.v.squaredNorm())) + h * h * S(sqrt(flight.a.squaredNorm()));
-      if (distance_sq > (reach + travel) * (reach + travel)) {
+      // The common case, before anything else is loaded: not near enough.
+      Vector3<S> drift = Vector3<S>::Zero();
+      Vector3<S> r = Vector3<S>(scene.bodies.positions()[j]) - Vector3<S>(scene.bodies.positions()[i]);
+      scene.domain.minimumImage(r, drift, scene.settings.time);
+      S far = reach + ways_[i] + ways_[j];
+      if (!(drift == Vector3<S>::Zero())) {
+        far += h * detail::safeNorm(drift);
+      }
+      if (r.squaredNorm() > far * far) {
         continue;
       }
       const std::uint64_t key1 = scene.bodies.ids()[i];
@@ -300,7 +309,7 @@ class ImpactEvents {
           !detail::canTouch(scene.bodies, i, j)) {
         continue;
       }
-      if (const auto t = timeOfImpact<S>(flight, reach, S(0))) {
+      if (const auto t = timeOfImpact<S>(flightOf(scene, i, j, drift), reach, S(0))) {
         out.push_back({*t, i, j, key1, key2});
       }
     }
@@ -617,6 +626,7 @@ class ImpactEvents {
   }
 
   std::vector<Event> queue_;
+  std::vector<S> ways_;  ///< [m] bound of the way of each body
   std::vector<std::vector<Event>> parts_;
   std::vector<History> history_;
   std::vector<std::uint32_t> start_;

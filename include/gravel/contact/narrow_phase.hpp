@@ -52,24 +52,41 @@ class NarrowPhase {
                        "above that of the one before it, " + std::to_string(boundaries[b - 1].number));
       }
     }
-    gather(pairs.size(), out, [&](std::size_t k, std::vector<Contact<S>>& part) {
-      appendPair(pairs[k], bodies, domain, materials, settings, part);
-    });
-    const auto pairContacts = static_cast<std::ptrdiff_t>(out.size());
-    if (boundaries.empty() || (nearBoundaries && nearBoundaries->empty())) {
-      return;
+    const bool walls = !boundaries.empty() && !(nearBoundaries && nearBoundaries->empty());
+    boundaryContacts_.clear();
+    if (walls) {
+      const std::size_t count = nearBoundaries ? nearBoundaries->size() : bodies.size();
+      gather(count, [&](std::size_t k, std::vector<Contact<S>>& part, Cursor& cursor) {
+        appendBoundaries(nearBoundaries ? (*nearBoundaries)[k] : k, bodies, materials, boundaries, settings,
+                         part, cursor);
+      });
+      for (const std::vector<Contact<S>>& part : std::span(parts_).first(used_)) {
+        boundaryContacts_.insert(boundaryContacts_.end(), part.begin(), part.end());
+      }
+      const auto before = [](const Contact<S>& a, const Contact<S>& b) { return keysBefore(a, b); };
+      if (!std::is_sorted(boundaryContacts_.begin(), boundaryContacts_.end(), before)) {
+        std::sort(boundaryContacts_.begin(), boundaryContacts_.end(), before);
+      }
     }
-    const std::size_t count = nearBoundaries ? nearBoundaries->size() : bodies.size();
-    gather(count, boundaryContacts_, [&](std::size_t k, std::vector<Contact<S>>& part) {
-      appendBoundaries(nearBoundaries ? (*nearBoundaries)[k] : k, bodies, materials, boundaries, settings,
-                       part);
+    gather(pairs.size(), [&](std::size_t k, std::vector<Contact<S>>& part, Cursor& cursor) {
+      appendPair(pairs[k], bodies, domain, materials, settings, part, cursor);
     });
-    const auto before = [](const Contact<S>& a, const Contact<S>& b) { return keysBefore(a, b); };
-    if (!std::is_sorted(boundaryContacts_.begin(), boundaryContacts_.end(), before)) {
-      std::sort(boundaryContacts_.begin(), boundaryContacts_.end(), before);
+    out.clear();
+    std::size_t total = boundaryContacts_.size();
+    for (const std::vector<Contact<S>>& part : std::span(parts_).first(used_)) {
+      total += part.size();
     }
-    out.insert(out.end(), boundaryContacts_.begin(), boundaryContacts_.end());
-    std::inplace_merge(out.begin(), out.begin() + pairContacts, out.end(), before);
+    out.reserve(total);
+    auto wall = boundaryContacts_.begin();
+    for (const std::vector<Contact<S>>& part : std::span(parts_).first(used_)) {
+      for (const Contact<S>& contact : part) {
+        while (wall != boundaryContacts_.end() && keysBefore(*wall, contact)) {
+          out.push_back(*wall++);
+        }
+        out.push_back(contact);
+      }
+    }
+    out.insert(out.end(), wall, boundaryContacts_.end());
   }
 
   /// The largest gap of a resting contact over the sum of the radii.
@@ -78,29 +95,27 @@ class NarrowPhase {
  private:
   static constexpr std::size_t chunk = 4096;
 
-  /// Calls append(k, part) for k = 0 … n-1 in chunks and joins the parts in order.
+  /// Where a chunk has got to in the list of those who rest; its own pairs come in the same order.
+  struct Cursor {
+    std::size_t place = 0;
+    bool placed = false;
+  };
+
+  /// Calls append(k, part, cursor) for k = 0 … n-1 in chunks, of which there are `used_`.
   template <class Append>
-  void gather(std::size_t n, std::vector<Contact<S>>& out, Append&& append) {
-    const std::size_t chunks = (n + chunk - 1) / chunk;
-    if (parts_.size() < chunks) {
-      parts_.resize(chunks);
+  void gather(std::size_t n, Append&& append) {
+    used_ = (n + chunk - 1) / chunk;
+    if (parts_.size() < used_) {
+      parts_.resize(used_);
     }
     parallelForChunks(n, chunk, [&](std::size_t begin, std::size_t end) {
       std::vector<Contact<S>>& part = parts_[begin / chunk];
       part.clear();
+      Cursor cursor;
       for (std::size_t k = begin; k < end; ++k) {
-        append(k, part);
+        append(k, part, cursor);
       }
     });
-    out.clear();
-    std::size_t total = 0;
-    for (std::size_t c = 0; c < chunks; ++c) {
-      total += parts_[c].size();
-    }
-    out.reserve(total);
-    for (std::size_t c = 0; c < chunks; ++c) {
-      out.insert(out.end(), parts_[c].begin(), parts_[c].end());
-    }
   }
 
   template <class B>
@@ -118,8 +133,20 @@ class NarrowPhase {
     return std::max<S>(settings.margin, std::min<S>(closing, restingMargin() * radii));
   }
 
-  static bool mayRest(const NarrowPhaseSettings<S>& settings, const ContactKeys& keys) {
-    return !settings.resting || std::binary_search(settings.resting->begin(), settings.resting->end(), keys);
+  static bool mayRest(const NarrowPhaseSettings<S>& settings, const ContactKeys& keys, Cursor& cursor) {
+    if (!settings.resting) {
+      return true;
+    }
+    const std::span<const ContactKeys> resting = *settings.resting;
+    if (!cursor.placed || (cursor.place > 0 && !(resting[cursor.place - 1] < keys))) {
+      cursor.place =
+          static_cast<std::size_t>(std::lower_bound(resting.begin(), resting.end(), keys) - resting.begin());
+      cursor.placed = true;
+    }
+    while (cursor.place < resting.size() && resting[cursor.place] < keys) {
+      ++cursor.place;
+    }
+    return cursor.place < resting.size() && resting[cursor.place] == keys;
   }
 
   static const Material<S>& surface(std::span<const Material<S>> materials, std::uint32_t id) {
@@ -133,7 +160,7 @@ class NarrowPhase {
   template <class B>
   static void appendPair(Pair pair, const B& bodies, const Domain<S>& domain,
                          std::span<const Material<S>> materials, const NarrowPhaseSettings<S>& settings,
-                         std::vector<Contact<S>>& part) {
+                         std::vector<Contact<S>>& part, Cursor& cursor) {
     std::uint32_t i = pair.first;
     std::uint32_t j = pair.second;
     const S r_i = bodies.radii()[i];
@@ -156,7 +183,7 @@ class NarrowPhase {
     }
     const std::uint32_t m_i = bodies.materials()[i];
     const std::uint32_t m_j = bodies.materials()[j];
-    if (touch->gap >= settings.margin && !mayRest(settings, {id_i, id_j})) {
+    if (touch->gap >= settings.margin && !mayRest(settings, {id_i, id_j}, cursor)) {
       return;
     }
     const Material<S>& surface_i = surface(materials, m_i);
@@ -167,14 +194,16 @@ class NarrowPhase {
   template <class B>
   static void appendBoundaries(std::size_t i, const B& bodies, std::span<const Material<S>> materials,
                                std::span<const HalfSpace<S>> boundaries,
-                               const NarrowPhaseSettings<S>& settings, std::vector<Contact<S>>& part) {
+                               const NarrowPhaseSettings<S>& settings, std::vector<Contact<S>>& part,
+                               Cursor& cursor) {
     const S radius = bodies.radii()[i];
     for (const HalfSpace<S>& wall : boundaries) {
       const S margin = marginOf(settings, radius, [&] { return accelerationOf(bodies, i); });
       const auto touch =
           sphereHalfSpace<S>(Vector3<S>(bodies.positions()[i]), radius, wall.normal, wall.offset, margin);
       if (touch && detail::isMovable(bodies, i) &&
-          (touch->gap < settings.margin || mayRest(settings, {bodies.ids()[i], boundaryKey(wall.number)}))) {
+          (touch->gap < settings.margin ||
+           mayRest(settings, {bodies.ids()[i], boundaryKey(wall.number)}, cursor))) {
         part.push_back(Contact<S>{static_cast<std::uint32_t>(i), staticPartner, bodies.ids()[i],
                                   boundaryKey(wall.number), touch->normal, touch->gap, touch->arm1,
                                   touch->arm2, mix(surface(materials, bodies.materials()[i]), wall.material),
@@ -184,6 +213,7 @@ class NarrowPhase {
   }
 
   std::vector<std::vector<Contact<S>>> parts_;
+  std::size_t used_ = 0;
   std::vector<Contact<S>> boundaryContacts_;
 };
 

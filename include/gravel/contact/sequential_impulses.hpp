@@ -233,34 +233,46 @@ class SequentialImpulses {
     return {};
   }
 
-  /// First on along the last step, then to where this contact is right.
+  /// First on along the last step, then to where this contact is right. The normal impulse leaves the slip as
+  /// it is, so that both are found from the same velocities.
   template <bool Friction>
   static Progress relax(ContactProblem<S>& problem, std::size_t k, const S& beta) {
     Row& row = problem.rows[k];
     Body& b1 = problem.bodies[row.slot1];
     Body& b2 = problem.bodies[row.slot2];
+    const Vector3<S> v_rel = b2.v - b1.v;
+    const S v_n = row.n.dot(v_rel);
     row.stepN *= beta;
     const S jn = row.jn + row.stepN;
-    const S next = jn + row.normalMass * (row.target - detail::normalVelocity(row, b1, b2));
+    const S next = jn + row.normalMass * (row.target - v_n);
     row.jn = next > S(0) ? next : S(0);
     const S dj = row.jn - jn;
     row.stepN += dj;
     Progress progress;
-    if (dj != S(0)) {
-      push(b1, b2, Vector3<S>(dj * row.n));
-      const S change = dj / row.normalMass;
-      progress.change_sq = change * change;
-      progress.along = row.stepN * change;
-      progress.size = dj * change;
-    }
+    const S change = dj * (b1.inverseMass + b2.inverseMass);
+    progress.change_sq = change * change;
+    progress.along = row.stepN * change;
+    progress.size = dj * change;
+    Vector3<S> j = dj * row.n;
     if constexpr (Friction) {
       if (row.staticFriction > S(0)) {
         row.stepT *= beta;
         row.jt += row.stepT;
         if (row.jn > S(0) || row.jt != Vector3<S>::Zero()) {
-          progress += rub(problem, k, b1, b2);
+          Vector3<S> slip = v_rel - v_n * row.n - Vector3<S>(row.c1 * b1.s + row.c2 * b2.s).cross(row.n);
+          if (!problem.slipTargets.empty()) {
+            slip -= problem.slipTargets[k];
+          }
+          const Vector3<S> dt = rubbed(row, slip, progress);
+          j += dt;
+          twist(row, b1, b2, dt);
         }
       }
+    }
+    if (j != Vector3<S>::Zero()) {
+      push(b1, b2, j);
+    }
+    if constexpr (Friction) {
       if (!problem.turning.empty()) {
         problem.turning[k].step *= beta;
         problem.turning[k].l += problem.turning[k].step;
@@ -271,31 +283,39 @@ class SequentialImpulses {
   }
 
   /// Friction of a row for its normal impulse. Sizes are compared as speeds, which are of order one.
-  static Progress rub(ContactProblem<S>& problem, std::size_t k, Body& b1, Body& b2) {
+  /// \return the change of the tangential impulse
+  static Vector3<S> rubbed(Row& row, const Vector3<S>& slip, Progress& progress) {
     using std::sqrt;
-    Row& row = problem.rows[k];
-    Vector3<S> slip = detail::slipVelocity(row, b1, b2);
-    if (!problem.slipTargets.empty()) {
-      slip -= problem.slipTargets[k];
-    }
     Vector3<S> jt = row.jt - row.tangentialMass * slip;
-    const S mobility = S(1) / row.tangentialMass;
-    const S size_sq = Vector3<S>(mobility * jt).squaredNorm();
+    const S size_sq = Vector3<S>(row.tangentialMobility * jt).squaredNorm();
     // A contact that keeps changing its mind between sticking and sliding slides: sweeps must end.
-    const S stick = (row.slides < patience ? row.staticFriction : row.kineticFriction) * row.jn * mobility;
+    const S stick =
+        (row.slides < patience ? row.staticFriction : row.kineticFriction) * row.jn * row.tangentialMobility;
     const bool slides = size_sq > stick * stick;
     if (slides) {
       row.slides = static_cast<std::uint8_t>(row.slides + (row.sliding ? 0U : 1U));
-      jt *= row.kineticFriction * row.jn * mobility / S(sqrt(size_sq));
+      jt *= row.kineticFriction * row.jn * row.tangentialMobility / S(sqrt(size_sq));
     }
     row.sliding = slides;
     const Vector3<S> dj = jt - row.jt;
     row.jt = jt;
     row.stepT += dj;
+    const Vector3<S> change = row.tangentialMobility * dj;
+    progress += {change.squaredNorm(), change.dot(row.stepT), change.dot(dj)};
+    return dj;
+  }
+
+  static Progress rub(ContactProblem<S>& problem, std::size_t k, Body& b1, Body& b2) {
+    Row& row = problem.rows[k];
+    Vector3<S> slip = detail::slipVelocity(row, b1, b2);
+    if (!problem.slipTargets.empty()) {
+      slip -= problem.slipTargets[k];
+    }
+    Progress progress;
+    const Vector3<S> dj = rubbed(row, slip, progress);
     push(b1, b2, dj);
     twist(row, b1, b2, dj);
-    const Vector3<S> change = mobility * dj;
-    return {change.squaredNorm(), change.dot(row.stepT), change.dot(dj)};
+    return progress;
   }
 
   static void turn(const detail::TurningRow<S>& row, Body& b1, Body& b2, const Vector3<S>& l) {

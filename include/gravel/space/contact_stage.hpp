@@ -111,6 +111,27 @@ class ContactStage {
     return count;
   }
 
+  /// All that touched in the last step: contacts() with impulses(), and after them the impacts inside it.
+  struct Touches {
+    std::vector<Contact<Scalar>> contacts;
+    std::vector<ContactImpulse<Scalar>> impulses;
+  };
+  Touches allTouches() const {
+    Touches all{contacts_, impulses()};
+    for (const Impact<Scalar>& impact : impacts_.impacts()) {
+      Contact<Scalar> c{};
+      c.first = impact.first;
+      c.second = impact.second;
+      c.key1 = impact.key1;
+      c.key2 = impact.key2;
+      c.normal = impact.normal;
+      c.arm1 = impact.distance;
+      all.contacts.push_back(c);
+      all.impulses.push_back(impact.impulse);
+    }
+    return all;
+  }
+
   /// The blows inside the last step, in the order in which they were dealt.
   const std::vector<Impact<Scalar>>& impacts() const { return impacts_.impacts(); }
 

@@ -60,24 +60,25 @@ auto Space<Scalar, Layout>::getDataForDisplay() const
 
 template <Real Scalar, class Layout>
 ContactVirial<Scalar> Space<Scalar, Layout>::contactVirial() const {
-  const std::vector<ContactImpulse<Scalar>> impulses = contactImpulses();
-  return gravel::contactVirial<Scalar, Layout>(bodies_, contacts(), impulses, previous_dt_);
+  const auto touches = contact_.allTouches();
+  return gravel::contactVirial<Scalar, Layout>(bodies_, touches.contacts, touches.impulses, previous_dt_);
 }
 
 template <Real Scalar, class Layout>
 SupportedWeight<Scalar> Space<Scalar, Layout>::supportedWeight() const {
-  const std::vector<ContactImpulse<Scalar>> impulses = contactImpulses();
-  return gravel::supportedWeight<Scalar, Layout>(bodies_, contacts(), impulses, previous_dt_, force_.field);
+  const auto touches = contact_.allTouches();
+  return gravel::supportedWeight<Scalar, Layout>(bodies_, touches.contacts, touches.impulses, previous_dt_,
+                                                 force_.field);
 }
 
 template <Real Scalar, class Layout>
 auto Space<Scalar, Layout>::planeForce(std::size_t plane) const -> Vector {
   (void)contact_.boundaries.at(plane);
   Vector impulse = Vector::Zero();
-  const std::vector<ContactImpulse<Scalar>> impulses = contactImpulses();
-  for (std::size_t k = 0; k < impulses.size(); ++k) {
-    if (contacts()[k].key2 == boundaryKey(plane)) {
-      impulse += impulses[k].normal * contacts()[k].normal + impulses[k].tangential;
+  const auto touches = contact_.allTouches();
+  for (std::size_t k = 0; k < touches.contacts.size(); ++k) {
+    if (touches.contacts[k].key2 == boundaryKey(plane)) {
+      impulse += touches.impulses[k].normal * touches.contacts[k].normal + touches.impulses[k].tangential;
     }
   }
   return previous_dt_ > Scalar(0) ? Vector(impulse / previous_dt_) : impulse;
