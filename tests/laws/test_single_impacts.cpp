@@ -2,7 +2,7 @@
 #include "support/catch.hpp"
 
 // The six test problems of Chung & Ooi 2011 (Granular Matter 13, 643) in their hard-sphere limit, through
-// whole steps of a space. A blow is dealt at the end of the step in which the surfaces first overlap; in
+// whole steps of a space. A blow is dealt when the surfaces touch, inside a step; in
 // these problems its outcome does not depend on how deep they overlap, so the closed forms hold to rounding.
 
 using namespace gravel;
