@@ -124,10 +124,12 @@ class ContactProblem {
   S largestApproach = S(0);  ///< largest change of a normal velocity that a contact asks for
 
   /// \param dt [s] step that these contacts stand for, >= 0
+  /// \param last impulses of the last solve in the order of contacts, zero for those that are new
   /// \param fresh contacts are others, or elsewhere, than at the last call
   template <ContactBodies B>
   void gather(std::span<const Contact<S>> contacts, const B& source, const ContactColoring& colouring,
-              const S& dt, const ContactSettings<S>& settings, bool fresh = true) {
+              const S& dt, const ContactSettings<S>& settings, std::span<const ContactImpulse<S>> last,
+              bool fresh) {
     if (fresh) {
       friction = std::any_of(contacts.begin(), contacts.end(),
                              [](const Contact<S>& c) { return c.material.staticFriction > S(0); });
@@ -160,7 +162,7 @@ class ContactProblem {
             fill(turning[k], contact, place, source);
           }
         }
-        aim(k, contact, dt, settings);
+        aim(k, contact, dt, settings, last[place.contact].normal > S(0));
         const S excess =
             rows[k].target - detail::normalVelocity(rows[k], bodies[place.slot1], bodies[place.slot2]);
         most = std::max<S>(most, excess);
@@ -209,6 +211,7 @@ class ContactProblem {
     const std::size_t n = colouring.bodies().size();
     bodies.resize(n + 1);
     accelerations_.resize(n + 1);
+    falls_.assign(n + 1, S(0));
     S fastest(0);
     S lightest(0);
     S heaviest(0);
@@ -224,6 +227,7 @@ class ContactProblem {
         b.s = r * Vector3<S>(source.angularVelocities()[i]);
       }
       accelerations_[slot] = movable ? Vector3<S>(source.accelerations()[i]) : Vector3<S>(Vector3<S>::Zero());
+      falls_[slot] = detail::safeNorm(accelerations_[slot]);
       b.inverseMass = movable ? S(source.masses()[i]) : S(0);  // the mass, until its scale is known
       b.spin = movable && r > S(0) && k > S(0) ? S(1) / k : S(0);
       fastest = std::max<S>(fastest, std::max<S>(detail::maxAbs(b.v), detail::maxAbs(b.s)));
@@ -283,7 +287,7 @@ class ContactProblem {
   }
 
   /// What the present velocities ask for.
-  void aim(std::size_t k, const Contact<S>& c, const S& dt, const ContactSettings<S>& settings) {
+  void aim(std::size_t k, const Contact<S>& c, const S& dt, const ContactSettings<S>& settings, bool loaded) {
     Row& row = rows[k];
     row.slides = 0;
     row.sliding = false;
@@ -300,7 +304,11 @@ class ContactProblem {
     const S drift_n = row.n.dot(drift);
     const S v_n = detail::normalVelocity(row, b1, b2) + drift_n;
     const S a_n = row.n.dot(Vector3<S>(accelerations_[row.slot2] - accelerations_[row.slot1]));
-    const S threshold = speedIn(settings.restitutionThreshold + S(2) * (a_n < S(0) ? S(-a_n) : a_n) * dt);
+    // In a heap at rest relative accelerations vanish, and what a step brings is passed on by the others:
+    // there no more than a fall of the step is rest.
+    const S falls = loaded ? S(falls_[row.slot1] + falls_[row.slot2]) : S(0);
+    const S pull = std::max<S>(S(2) * (a_n < S(0) ? S(-a_n) : a_n), falls);
+    const S threshold = speedIn(S(settings.restitutionThreshold + pull * dt));
     const S allowed =
         c.gap > S(0) ? (dt > S(0) ? speedIn(S(c.gap / dt)) : Eigen::NumTraits<S>::highest()) : S(0);
     const S speed = v_n < S(0) ? S(-v_n) : v_n;
@@ -329,6 +337,7 @@ class ContactProblem {
   static S ratio(const S& arm, const S& radius) { return radius > S(0) ? arm / radius : S(0); }
 
   std::vector<Vector3<S>> accelerations_;  ///< [m s^-2] by slot, of the movable
+  std::vector<S> falls_;                   ///< their sizes
   std::vector<S> approach_;
   int speedExponent_ = 0;
   int massExponent_ = 0;

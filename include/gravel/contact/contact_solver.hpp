@@ -73,7 +73,7 @@ class ContactSolver {
     ContactReport<S> report;
     bool solved = false;
     if (!contacts.empty()) {
-      problem_.gather(contacts, bodies, coloring_, dt, settings_, fresh_);
+      problem_.gather(contacts, bodies, coloring_, dt, settings_, impulses_, fresh_);
       fresh_ = false;
       if (problem_.active) {
         guess(dt);

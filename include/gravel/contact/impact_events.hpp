@@ -74,6 +74,7 @@ struct FixedCandidates {
   std::span<const Pair> list;
 
   std::span<const Pair> pairs() const { return list; }
+  static std::uint64_t version() { return 0; }
   template <class B, class S>
   void follow(const B&, std::uint32_t, const S&, std::vector<Pair>&) {}
 };
@@ -117,10 +118,10 @@ class ImpactEvents {
  public:
   /// Between the kick and the drift: changes positions, velocities and spins so that the drift ends where the
   /// bodies are after all impacts.
-  /// \param near  `pairs()`: candidates sorted by ids, every pair that may touch in the step; `follow(bodies,
-  /// i, h, out)` appends those that a new course of body i adds
-  /// \param held contacts that are solved otherwise, sorted by keys
-  /// \param nearWalls indices of the bodies that may touch a boundary in the step; all without it
+  /// \param near  `pairs()`: candidates sorted by ids, every pair that may touch in the step; `version()`: a
+  /// number that changes with them, 0 if unknown; `follow(bodies, i, h, out)` appends those that a new course
+  /// of body i adds \param held contacts that are solved otherwise, sorted by keys \param nearWalls indices
+  /// of the bodies that may touch a boundary in the step; all without it
   template <ContactBodies B, class Candidates, class Course = StraightCourse<S>>
   ImpactReport<S> resolve(B& bodies, Candidates& near, const Domain<S>& domain,
                           std::span<const Material<S>> materials, std::span<const HalfSpace<S>> walls,
@@ -133,8 +134,22 @@ class ImpactEvents {
     predictAll(scene, near.pairs(), nearWalls);
     ImpactReport<S> report;
     if (!queue_.empty()) {
-      history_.assign(bodies.size(), History{});
-      link(bodies.size(), near.pairs());
+      for (const std::uint32_t i : touched_) {
+        history_[i] = History{};
+      }
+      touched_.clear();
+      history_.resize(bodies.size());
+      leans_.assign(bodies.size(), 0);
+      for (const Contact<S>& c : held) {
+        leans_[c.first] = 1;
+        if (c.second != staticPartner) {
+          leans_[c.second] = 1;
+        }
+      }
+      if (linked_ != near.version() || near.version() == 0 || start_.size() != bodies.size() + 1) {
+        link(bodies.size(), near.pairs());
+        linked_ = near.version();
+      }
     }
     while (!queue_.empty()) {
       std::pop_heap(queue_.begin(), queue_.end(), after);
@@ -446,7 +461,9 @@ class ImpactEvents {
       const S least = S(1) / S(32);
       past.spent += past.impacts > 0 && past.partner == partner ? least : S(S(1) - e + least);
       past.partner = partner;
-      ++past.impacts;
+      if (past.impacts++ == 0) {
+        touched_.push_back(body);
+      }
       report.postponed += isDone(scene, body) && !before ? 1U : 0U;
     };
     enter(impact.first, impact.key2);
@@ -545,7 +562,14 @@ class ImpactEvents {
       return false;
     }
     const S speed = v_n < S(0) ? S(-v_n) : S(0);
-    const S e = speed > scene.settings.restitutionThreshold ? restitutionAt(material, speed) : S(0);
+    // In a heap, where both already lean on others, what a step's fall brings is rest.
+    S threshold = scene.settings.restitutionThreshold;
+    if (leans_[event.first] != 0 && (boundary || leans_[event.second] != 0)) {
+      S fall = detail::safeNorm(scene.acceleration(event.first));
+      fall += boundary ? S(0) : detail::safeNorm(scene.acceleration(event.second));
+      threshold = std::max<S>(threshold, fall * h);
+    }
+    const S e = speed > threshold ? restitutionAt(material, speed) : S(0);
     const S pull = a_n < S(0) ? S(-a_n) : S(0);
     const bool rests = pull > S(0) && (still || S(2) * e * speed <= (S(1) - e) * pull * (h - t));
     const S target = rests ? S(pull * (h - t) / S(2)) : e * speed;
@@ -629,6 +653,9 @@ class ImpactEvents {
   std::vector<S> ways_;  ///< [m] bound of the way of each body
   std::vector<std::vector<Event>> parts_;
   std::vector<History> history_;
+  std::vector<unsigned char> leans_;    ///< bodies with a contact that is held
+  std::vector<std::uint32_t> touched_;  ///< bodies with a history
+  std::uint64_t linked_ = 0;
   std::vector<std::uint32_t> start_;
   std::vector<std::uint32_t> ofBody_;
   std::vector<Pair> late_;

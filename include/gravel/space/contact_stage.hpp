@@ -54,13 +54,22 @@ class ContactStage {
     if (!searched || !goesOn) {
       search(bodies, config, time, AtRest{}, profiler);
     }
-    const Profiler::Scope scope(profiler, Phase::NarrowPhase);
     prepareSurfaces(config);
     NarrowPhaseSettings<Scalar> settings{time, config.epsilon, Scalar(0), h};
-    if (goesOn) {
-      rememberResting();
-      settings.resting = resting_;
+    if (!goesOn) {
+      const Profiler::Scope scope(profiler, Phase::NarrowPhase);
+      narrow_.find(neighbours_.pairs(), bodies, domain, materials.entries(), walls_, settings, contacts_,
+                   nearBoundaries(bodies));
+      return;
     }
+    rememberResting();
+    settings.resting = resting_;
+    if (searched && resting_.empty() && report_.postponed == 0) {
+      contacts_.clear();
+      profiler.skip(Phase::NarrowPhase, "all that met on the way parted again");
+      return;
+    }
+    const Profiler::Scope scope(profiler, Phase::NarrowPhase);
     narrow_.find(neighbours_.pairs(), bodies, domain, materials.entries(), walls_, settings, contacts_,
                  nearBoundaries(bodies));
   }
@@ -345,6 +354,7 @@ class ContactStage {
       NeighbourList<Scalar>& list;
       const decltype(way)& travel;
       const std::vector<Pair>& pairs() const { return list.pairs(); }
+      std::uint64_t version() const { return list.version(); }
       void follow(const Bodies& all, std::uint32_t i, const Scalar&, std::vector<Pair>& out) {
         list.follow(i, all.positions(), all.radii(), all.ids(), travel(i), travel, out);
       }
@@ -411,8 +421,11 @@ class ContactStage {
         resting_.push_back({impact.key1, impact.key2});
       }
     }
-    std::sort(resting_.begin() + old, resting_.end());
-    std::inplace_merge(resting_.begin(), resting_.begin() + old, resting_.end());
+    if (static_cast<std::ptrdiff_t>(resting_.size()) > old) {
+      std::sort(resting_.begin() + old, resting_.end());
+      std::inplace_merge(resting_.begin(), resting_.begin() + old, resting_.end());
+      resting_.erase(std::unique(resting_.begin(), resting_.end()), resting_.end());
+    }
   }
 
   const char* reasonToSkip(const Bodies& bodies) const {

@@ -35,6 +35,7 @@ class NeighbourList {
                                   const S& margin = S(0), const Travel& travel = {}) {
     detail::require("margin of a neighbour list", margin, detail::nonNegative<S>());
     ++updates_;
+    version_ += extra_.empty() ? 0U : 1U;
     extra_.clear();
     strays_ = false;
     reason_ = whatIsStale(positions, radii, revision, domain, time, margin, travel);
@@ -79,6 +80,9 @@ class NeighbourList {
       join(ids);
     }
   }
+
+  /// A number that is another one, above 0, whenever pairs() may be others.
+  std::uint64_t version() const { return version_; }
 
   /// Whether some body was, or is on a way to be, further than half the skin from where the last search saw
   /// it.
@@ -219,6 +223,7 @@ class NeighbourList {
     if (extra_.empty()) {
       return;
     }
+    ++version_;
     const auto keys = [&](const Pair& pair) {
       return std::pair(detail::idKey(ids[pair.first]), detail::idKey(ids[pair.second]));
     };
@@ -234,6 +239,7 @@ class NeighbourList {
                const Domain<S>& domain, const S& time, const S& margin, const Travel& travel) {
     const std::size_t n = positions.size();
     const bool motionSeen = built_ && revision == revision_ && n == places_.size() && isFinite(moved_sq_);
+    ++version_;
     built_ = false;  // stays so if the search throws
     places_.resize(n);
     radii_.resize(n);
@@ -309,7 +315,7 @@ class NeighbourList {
   /// of the mean radius; no skin at all where it would not even hold for two.
   S chooseSkin(const S& meanRadius, bool motionSeen) {
     constexpr double goodLife = 16.0;
-    const S thickest = S(0.4) * meanRadius;
+    const S thickest = S(0.8) * meanRadius;
     const S thinnest = S(0.02) * meanRadius;
     if (!motionSeen || !(moved_sq_ > S(0))) {
       return S(0.1) * meanRadius;
@@ -361,6 +367,7 @@ class NeighbourList {
   std::optional<S> fixedSkin_;
   std::uint64_t revision_ = 0;
   std::uint64_t updates_ = 0;  ///< since the last search
+  std::uint64_t version_ = 0;
   const char* reason_ = nullptr;
   bool strays_ = false;
   bool built_ = false;

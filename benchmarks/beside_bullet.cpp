@@ -1,0 +1,300 @@
+/// Settled piles and an elastic gas in gravel and in Bullet (its default solver, in the precision that it is
+/// built with), in one run and in turns, so that what else the machine does disturbs both alike. One thread,
+/// processor time, median of the rounds, with the errors beside it. Built where Bullet is installed.
+///
+///   bench_beside_bullet [bodies] [steps to settle] [rounds] [steps a round]
+
+#include "scenes/scenes.hpp"
+#include "stopwatch.hpp"
+#include <gravel/gravel.hpp>
+
+#include <btBulletDynamicsCommon.h>
+#include <omp.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <deque>
+#include <memory>
+
+namespace {
+
+using namespace gravel;
+using Vec = Vector3<double>;
+
+constexpr double radius = 0.5;
+constexpr double g = 9.81;
+constexpr double friction = 0.5;
+
+struct Errors {
+  double meanOverlap = 0;  ///< over the radius
+  double largestOverlap = 0;
+  double kinetic = 0;  ///< over N m g R
+};
+
+/// What both engines simulate.
+struct Scene {
+  std::vector<Body<double>> bodies;
+  double width = 0;    ///< of the box
+  double height = -1;  ///< of its lid; none if negative
+  double g = 0;
+  double e = 0;
+  double mu = 0;
+  double h = 1.0 / 60;
+};
+
+Scene pile(std::size_t n, double e) {
+  Scene scene;
+  const auto side = static_cast<std::size_t>(std::cbrt(static_cast<double>(n)) + 0.5);
+  scene.width = 1.1 * static_cast<double>(side) * 2 * radius;
+  scene.g = g;
+  scene.e = e;
+  scene.mu = friction;
+  const double spacing = scene.width / static_cast<double>(side);
+  const CounterRandom random(1);
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto at = [&](std::size_t k, std::uint64_t axis) {
+      return (static_cast<double>(k) + 0.5) * spacing - scene.width / 2 +
+             random.uniform(3 * i + axis, -0.04, 0.04);
+    };
+    Body<double> grain;
+    grain.radius = radius;
+    grain.mass = 1;
+    grain.position = {at(i % side, 0), at(i / side % side, 1),
+                      radius + 0.04 + static_cast<double>(i / (side * side)) * 2.2 * radius};
+    scene.bodies.push_back(grain);
+  }
+  return scene;
+}
+
+/// Elastic and frictionless at volume fraction 0.2 in a box; a sphere moves 0.01 of its diameter a step.
+Scene gas(std::size_t n) {
+  Scene scene;
+  scene.e = 1;
+  scene.width = gravel::scenes::gasBoxLength(n, 0.2) + 2 * radius;
+  scene.height = scene.width;
+  for (Body<double> body :
+       gravel::scenes::randomGas<double>(n, 0.2)) {  // apart in a periodic box: all the more in this one
+    body.position[2] += scene.width / 2;
+    scene.bodies.push_back(body);
+  }
+  double speed_sq = 0;
+  for (const Body<double>& body : scene.bodies) {
+    speed_sq += body.velocity.squaredNorm() / static_cast<double>(n);
+  }
+  scene.h = 0.01 * 2 * radius / std::sqrt(speed_sq);
+  return scene;
+}
+
+class Gravel {
+ public:
+  explicit Gravel(const Scene& scene) : scene_(scene), space_(configOf(scene)) {
+    space_.addPlane({0, 0, 1}, 0);
+    for (const double s : {-1.0, 1.0}) {
+      space_.addPlane({s, 0, 0}, -scene.width / 2);
+      space_.addPlane({0, s, 0}, -scene.width / 2);
+    }
+    if (scene.height > 0) {
+      space_.addPlane({0, 0, -1}, -scene.height);
+    }
+    space_.setUniformField({0, 0, -scene.g});
+    for (const Body<double>& body : scene.bodies) {
+      space_.addBody(body);
+    }
+  }
+
+  void step() {
+    space_.computeDynamics(steps_++);
+    sweeps_ += space_.contactReport().iterations;
+    impacts_ += space_.contactReport().impacts;
+  }
+  double kinetic() const { return std::get<0>(space_.calculateSystemEnergy()); }
+  Errors errors() const {
+    Errors errors;
+    for (const Contact<double>& c : space_.contacts()) {
+      errors.meanOverlap += std::max(0.0, -c.gap) / radius / static_cast<double>(space_.contacts().size());
+      errors.largestOverlap = std::max(errors.largestOverlap, -c.gap / radius);
+    }
+    errors.kinetic = kinetic() / (static_cast<double>(space_.n()) * g * radius);
+    return errors;
+  }
+  void report() const {
+    std::printf("gravel: %zu contacts, %zu colours, %.1f sweeps and %.1f impacts a step, weight error %.1e\n",
+                space_.contacts().size(), space_.contactReport().colours,
+                static_cast<double>(sweeps_) / static_cast<double>(steps_),
+                static_cast<double>(impacts_) / static_cast<double>(steps_),
+                scene_.g > 0 ? space_.supportedWeight().residual() : 0.0);
+    space_.printProfilingReport();
+  }
+
+ private:
+  static SimulationConfig<double> configOf(const Scene& scene) {
+    SimulationConfig<double> config;
+    config.G = 0;
+    config.timeStep = scene.h;
+    config.adaptiveTimeStep = false;
+    config.coeffRestitution = scene.e;
+    config.coeffFriction = config.coeffStaticFriction = scene.mu;
+    config.contactTolerance = 1e-2;
+    config.contactIterations = 8;
+    return config;
+  }
+
+  Scene scene_;
+  Space<double> space_;
+  std::size_t steps_ = 0;
+  long sweeps_ = 0;
+  std::size_t impacts_ = 0;
+};
+
+class Bullet {
+ public:
+  explicit Bullet(const Scene& scene)
+      : h_(scene.h),
+        dispatcher_(&configuration_),
+        world_(&dispatcher_, &broadphase_, &solver_, &configuration_) {
+    world_.setGravity(btVector3(0, 0, btScalar(-scene.g)));
+    const auto plane = [&](double x, double y, double z, double offset) {
+      add(scene, new btStaticPlaneShape(btVector3(btScalar(x), btScalar(y), btScalar(z)), btScalar(offset)),
+          nullptr);
+    };
+    plane(0, 0, 1, 0);
+    for (const double s : {-1.0, 1.0}) {
+      plane(s, 0, 0, -scene.width / 2);
+      plane(0, s, 0, -scene.width / 2);
+    }
+    if (scene.height > 0) {
+      plane(0, 0, -1, -scene.height);
+    }
+    auto* const sphere = new btSphereShape(btScalar(radius));
+    for (const Body<double>& body : scene.bodies) {
+      add(scene, sphere, &body);
+    }
+  }
+
+  void step() { world_.stepSimulation(btScalar(h_), 0); }
+  double kinetic() const {
+    double sum = 0;
+    for (const auto& body : bodies_) {
+      sum += body->getInvMass() > 0 ? 0.5 * static_cast<double>(body->getLinearVelocity().length2()) : 0.0;
+    }
+    return sum;
+  }
+  Errors errors() {
+    Errors errors;
+    double contacts = 0;
+    for (int m = 0; m < dispatcher_.getNumManifolds(); ++m) {
+      const btPersistentManifold* manifold = dispatcher_.getManifoldByIndexInternal(m);
+      for (int p = 0; p < manifold->getNumContacts(); ++p) {
+        const double gap = static_cast<double>(manifold->getContactPoint(p).getDistance());
+        contacts += 1;
+        errors.meanOverlap += std::max(0.0, -gap) / radius;
+        errors.largestOverlap = std::max(errors.largestOverlap, -gap / radius);
+      }
+    }
+    errors.meanOverlap /= std::max(1.0, contacts);
+    errors.kinetic = kinetic() / (static_cast<double>(bodies_.size()) * g * radius);
+    return errors;
+  }
+
+ private:
+  void add(const Scene& scene, btCollisionShape* shape, const Body<double>* body) {
+    if (shapes_.empty() || shapes_.back().get() != shape) {
+      shapes_.emplace_back(shape);
+    }
+    btVector3 inertia(0, 0, 0);
+    if (body != nullptr) {
+      shape->calculateLocalInertia(btScalar(body->mass), inertia);
+    }
+    btRigidBody::btRigidBodyConstructionInfo info(body != nullptr ? btScalar(body->mass) : btScalar(0),
+                                                  nullptr, shape, inertia);
+    info.m_friction = btScalar(std::sqrt(scene.mu));  // Bullet multiplies those of the two
+    info.m_restitution = btScalar(scene.e);
+    info.m_startWorldTransform.setIdentity();
+    const auto vector = [](const Vec& v) {
+      return btVector3(btScalar(v[0]), btScalar(v[1]), btScalar(v[2]));
+    };
+    if (body != nullptr) {
+      info.m_startWorldTransform.setOrigin(vector(body->position));
+    }
+    bodies_.push_back(std::make_unique<btRigidBody>(info));
+    if (body != nullptr) {
+      bodies_.back()->setLinearVelocity(vector(body->velocity));
+    }
+    bodies_.back()->setActivationState(DISABLE_DEACTIVATION);
+    world_.addRigidBody(bodies_.back().get());
+  }
+
+  double h_;
+  btDefaultCollisionConfiguration configuration_;
+  btCollisionDispatcher dispatcher_;
+  btDbvtBroadphase broadphase_;
+  btSequentialImpulseConstraintSolver solver_;
+  std::deque<std::unique_ptr<btCollisionShape>> shapes_;
+  std::deque<std::unique_ptr<btRigidBody>> bodies_;
+  btDiscreteDynamicsWorld world_;
+};
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+template <class Engine>
+double timed(Engine& engine, std::size_t steps) {
+  const Stopwatch watch;
+  for (std::size_t k = 0; k < steps; ++k) {
+    engine.step();
+  }
+  return watch.nanoseconds() / 1e6 / static_cast<double>(steps);
+}
+
+void compare(const char* name, const Scene& scene, std::size_t settle, std::size_t rounds,
+             std::size_t steps) {
+  Gravel ours(scene);
+  Bullet theirs(scene);
+  const double start = ours.kinetic();
+  for (std::size_t k = 0; k < settle; ++k) {
+    ours.step();
+    theirs.step();
+  }
+  std::vector<double> a;
+  std::vector<double> b;
+  std::vector<double> ratio;
+  for (std::size_t r = 0; r < rounds; ++r) {
+    a.push_back(timed(ours, steps));
+    b.push_back(timed(theirs, steps));
+    ratio.push_back(b.back() / a.back());
+  }
+  std::printf("\n%s, %zu bodies, after %zu steps\n", name, scene.bodies.size(), settle);
+  const auto line = [&](const char* who, double ms, const Errors& errors, double kinetic) {
+    std::printf("%-8s %8.2f ms a step, overlap/R mean %.1e largest %.1e, ", who, ms, errors.meanOverlap,
+                errors.largestOverlap);
+    if (scene.g > 0) {
+      std::printf("kinetic/(N m g R) %.1e\n", errors.kinetic);
+    } else {
+      std::printf("kinetic energy changed by %.1e of it\n", kinetic / start - 1);
+    }
+  };
+  line("gravel", median(a), ours.errors(), ours.kinetic());
+  line("Bullet", median(b), theirs.errors(), theirs.kinetic());
+  std::printf("Bullet / gravel: %.2f\n", median(ratio));
+  ours.report();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const auto argument = [&](int i, std::size_t otherwise) {
+    return argc > i ? static_cast<std::size_t>(std::strtoul(argv[i], nullptr, 10)) : otherwise;
+  };
+  omp_set_num_threads(1);
+  const std::size_t n = argument(1, 1000);
+  const std::size_t settle = argument(2, 300);
+  const std::size_t rounds = argument(3, 5);
+  const std::size_t steps = argument(4, 20);
+  compare("pile, e = 0", pile(n, 0.0), settle, rounds, steps);
+  compare("pile, e = 0.5", pile(n, 0.5), settle, rounds, steps);
+  compare("gas, elastic, volume fraction 0.2", gas(n), 100, rounds, steps);
+}
