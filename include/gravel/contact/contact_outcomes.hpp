@@ -7,6 +7,7 @@
 #include <gravel/contact/contact.hpp>
 #include <gravel/contact/contact_bodies.hpp>
 
+#include <algorithm>
 #include <span>
 #include <utility>
 
@@ -21,10 +22,11 @@ struct ContactOutcomes {
 
 /// Asks `hook` about each contact of two bodies that approach faster than what rests picks up in a step,
 /// `threshold` + 2 |a_rel.n| h, and gives them the velocities of its outcome. O(contacts), one thread.
+/// \param decided pairs of ids about which it was asked in this step already
 template <Real S, ContactBodies B>
 ContactOutcomes<S> decideContacts(std::span<const Contact<S>> contacts, B& bodies,
-                                  const CollisionHook<S>& hook, const S& time, const S& threshold,
-                                  const S& h) {
+                                  const CollisionHook<S>& hook, const S& time, const S& threshold, const S& h,
+                                  const std::vector<std::pair<std::uint64_t, std::uint64_t>>& decided = {}) {
   ContactOutcomes<S> outcomes;
   const auto partner = [&](std::uint32_t i, std::uint64_t id) {
     return typename Collision<S>::Partner{BodyId{id},
@@ -40,7 +42,8 @@ ContactOutcomes<S> decideContacts(std::span<const Contact<S>> contacts, B& bodie
                                         : Vector3<S>(Vector3<S>::Zero());
   };
   for (const Contact<S>& c : contacts) {
-    if (c.second == staticPartner) {
+    if (c.second == staticPartner ||
+        std::find(decided.begin(), decided.end(), std::pair(c.key1, c.key2)) != decided.end()) {
       continue;
     }
     const Vector3<S> v_rel =

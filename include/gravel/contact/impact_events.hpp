@@ -9,6 +9,7 @@
 /// both parts of its path, and the kick that ends the step is the same as without the blow. In a uniform
 /// field that is exact; with forces that change along the way it is of second order in h.
 
+#include <gravel/contact/collision_outcome.hpp>
 #include <gravel/contact/contact.hpp>
 #include <gravel/contact/contact_bodies.hpp>
 #include <gravel/contact/contact_settings.hpp>
@@ -49,6 +50,7 @@ struct Impact {
   ContactImpulse<Scalar> impulse;  ///< on the second
   bool rests;                      ///< it stays in contact for the rest of the step
   Scalar settle;  ///< [s] since the start of the step: when the last of its bounces is over, if it rests
+  bool decided = false;  ///< by somebody else's outcome: the two take no notice of each other in this step
 };
 
 /// A body that began to turn otherwise inside the step.
@@ -68,6 +70,9 @@ struct ImpactReport {
   Scalar frictionLoss = Scalar(0);
   Scalar driftWork = Scalar(0);
 };
+
+/// Nobody else decides what an impact does.
+struct NoDecision {};
 
 /// Candidates that are known to suffice for every course that a body may take.
 struct FixedCandidates {
@@ -122,12 +127,15 @@ class ImpactEvents {
   /// number that changes with them, 0 if unknown; `follow(bodies, i, h, out)` appends those that a new course
   /// of body i adds \param held contacts that are solved otherwise, sorted by keys \param nearWalls indices
   /// of the bodies that may touch a boundary in the step; all without it
-  template <ContactBodies B, class Candidates, class Course = StraightCourse<S>>
+  /// \param decide  asked about each impact of two bodies that is faster than what rests: `decide(impact,
+  /// material, v1, v2, v_rel)` with the velocities of the moment gives a `CollisionOutcome`. Two that shall
+  /// merge fly on through each other for the rest of the step.
+  template <ContactBodies B, class Candidates, class Course = StraightCourse<S>, class Decide = NoDecision>
   ImpactReport<S> resolve(B& bodies, Candidates& near, const Domain<S>& domain,
                           std::span<const Material<S>> materials, std::span<const HalfSpace<S>> walls,
                           std::span<const Contact<S>> held, const ImpactSettings<S>& settings,
                           std::optional<std::span<const std::uint32_t>> nearWalls = std::nullopt,
-                          Course&& course = {}) {
+                          Course&& course = {}, const Decide& decide = {}) {
     using Path = std::remove_reference_t<Course>;
     clear();
     const Scene<B, Path> scene{bodies, domain, materials, walls, held, settings, course};
@@ -160,7 +168,7 @@ class ImpactEvents {
           (second && history_[event.second].impacts != event.stamp2)) {
         continue;
       }
-      if (!strike(scene, event, report)) {
+      if (!strike(scene, event, decide, report)) {
         continue;
       }
       near.follow(bodies, event.first, settings.h, late_);
@@ -180,9 +188,12 @@ class ImpactEvents {
     impacts_.clear();
     earlier_.clear();
     turns_.clear();
+    merges_.clear();
     late_.clear();
   }
 
+  /// Pairs of ids that shall merge, in the order of the impacts of the last call.
+  const std::vector<std::pair<std::uint64_t, std::uint64_t>>& merges() const { return merges_; }
   /// Pairs that follow() added in the last call.
   const std::vector<Pair>& candidatesAdded() const { return late_; }
   /// The blows of the last call, in the order in which they were dealt.
@@ -414,6 +425,9 @@ class ImpactEvents {
     const S reach = S(scene.bodies.radii()[i]) + S(scene.bodies.radii()[j]);
     const std::uint64_t key1 = scene.bodies.ids()[i];
     const std::uint64_t key2 = scene.bodies.ids()[j];
+    if (isDecided(i, key2)) {
+      return;
+    }
     if (isHeld(scene, i, key1, key2)) {
       const Vector3<S> r = flight.place(from);
       const S distance = detail::safeNorm(r);
@@ -432,6 +446,16 @@ class ImpactEvents {
     event.stamp2 = event.second == staticPartner ? 0 : history_[event.second].impacts;
     queue_.push_back(event);
     std::push_heap(queue_.begin(), queue_.end(), after);
+  }
+
+  /// Whether somebody else has decided about the pair in this step.
+  bool isDecided(std::uint32_t first, std::uint64_t key2) const {
+    for (std::uint32_t k = history_[first].rests; k != none; k = earlier_[k]) {
+      if (impacts_[k].decided && impacts_[k].key2 == key2) {
+        return true;
+      }
+    }
+    return false;
   }
 
   /// Solved together with others; or brought to rest in this step.
@@ -471,7 +495,7 @@ class ImpactEvents {
       enter(impact.second, impact.key1);
     }
     earlier_.push_back(none);
-    if (impact.rests) {
+    if (impact.rests || impact.decided) {
       earlier_.back() = history_[impact.first].rests;
       history_[impact.first].rests = static_cast<std::uint32_t>(impacts_.size() - 1);
     }
@@ -514,8 +538,8 @@ class ImpactEvents {
   }
 
   /// Deals a blow. \return whether a course changed
-  template <class Scene>
-  bool strike(const Scene& scene, const Event& event, ImpactReport<S>& report) {
+  template <class Scene, class Decide>
+  bool strike(const Scene& scene, const Event& event, const Decide& decide, ImpactReport<S>& report) {
     const auto& bodies = scene.bodies;
     const S& h = scene.settings.h;
     const S& t = event.t;
@@ -570,6 +594,24 @@ class ImpactEvents {
       threshold = std::max<S>(threshold, fall * h);
     }
     const S e = speed > threshold ? restitutionAt(material, speed) : S(0);
+    if constexpr (!std::is_same_v<Decide, NoDecision>) {
+      if (!boundary && speed > threshold) {
+        Impact<S> impact{event.first, event.second, event.key1, event.key2, t, speed,
+                         n,           distance,     {},         false,      t, true};
+        const CollisionOutcome<S> outcome = decide(impact, material, one.v, two.v, v_rel);
+        if (outcome.kind != CollisionKind::Bounce) {
+          impacts_.push_back(impact);
+          remember(scene, S(0), report);
+          if (outcome.kind == CollisionKind::Merge) {
+            merges_.emplace_back(event.key1, event.key2);
+          } else {
+            give(scene, event.first, one, outcome.velocity1, outcome.angularVelocity1, t, report);
+            give(scene, event.second, two, outcome.velocity2, outcome.angularVelocity2, t, report);
+          }
+          return true;
+        }
+      }
+    }
     const S pull = a_n < S(0) ? S(-a_n) : S(0);
     const bool rests = pull > S(0) && (still || S(2) * e * speed <= (S(1) - e) * pull * (h - t));
     const S target = rests ? S(pull * (h - t) / S(2)) : e * speed;
@@ -638,6 +680,23 @@ class ImpactEvents {
     return true;
   }
 
+  /// The body leaves with this velocity and spin.
+  template <class Scene>
+  void give(const Scene& scene, std::uint32_t i, const Side& side, const Vector3<S>& v, const Vector3<S>& w,
+            const S& t, ImpactReport<S>& report) {
+    if (!side.movable) {
+      return;
+    }
+    const Vector3<S> nothing = Vector3<S>::Zero();
+    const Vector3<S> before = scene.bodies.angularVelocities()[i];
+    const S moment = S(scene.bodies.inertiaFactors()[i]) * side.mass * side.r * side.r;
+    report.restitutionLoss -= side.mass * Vector3<S>(v - side.v).dot(Vector3<S>(v + side.v)) / S(2);
+    report.frictionLoss -= moment * Vector3<S>(w - before).dot(Vector3<S>(w + before)) / S(2);
+    scene.course.push(scene.bodies, i, S(1), {Vector3<S>(v - side.v), nothing, nothing}, t);
+    scene.bodies.angularVelocities()[i] = w;
+    turns_.push_back({i, t, before, w});
+  }
+
   template <class Scene>
   void twist(const Scene& scene, std::uint32_t i, const S& mobility, const Vector3<S>& turn, const S& t) {
     const S r = scene.bodies.radii()[i];
@@ -662,6 +721,7 @@ class ImpactEvents {
   std::vector<Impact<S>> impacts_;
   std::vector<std::uint32_t> earlier_;  ///< of an impact that rests: the one before of the same first body
   std::vector<TurnChange<S>> turns_;
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> merges_;
 };
 
 }  // namespace gravel

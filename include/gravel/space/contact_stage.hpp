@@ -103,6 +103,9 @@ class ContactStage {
     }
   }
 
+  /// Pairs of ids that a user lets merge after impacts inside the last step.
+  const std::vector<std::pair<std::uint64_t, std::uint64_t>>& merges() const { return impacts_.merges(); }
+
   /// Pairs that touched in the last step: contacts at its end, and impacts of others.
   std::size_t touches() const {
     std::size_t count = contacts_.size();
@@ -217,6 +220,7 @@ class ContactStage {
 
   /// Bodies are not those of the contacts any more.
   void forgetContacts() {
+    impacts_.clear();
     contacts_.clear();
     coloured_ = false;
     moved_ = false;
@@ -359,12 +363,35 @@ class ContactStage {
         list.follow(i, all.positions(), all.radii(), all.ids(), travel(i), travel, out);
       }
     } near{neighbours_, way};
-    const ImpactReport<Scalar> blows = impacts_.resolve(
-        bodies, near, domain, std::span<const Material<Scalar>>(materials.entries()),
-        std::span<const HalfSpace<Scalar>>(walls_), std::span<const Contact<Scalar>>(contacts_),
-        ImpactSettings<Scalar>{time, h, std::max(config.restitutionThreshold, config.epsilon),
-                               config.epsilon},
-        nearBoundaries(bodies), course);
+    const ImpactSettings<Scalar> settings{time, h, std::max(config.restitutionThreshold, config.epsilon),
+                                          config.epsilon};
+    const std::span<const Material<Scalar>> surfaces(materials.entries());
+    const std::span<const HalfSpace<Scalar>> walls(walls_);
+    const std::span<const Contact<Scalar>> held(contacts_);
+    ImpactReport<Scalar> blows;
+    if (collisionHook) {
+      const auto decide = [&](const Impact<Scalar>& impact, const Material<Scalar>& material,
+                              const Vector3<Scalar>& v1, const Vector3<Scalar>& v2,
+                              const Vector3<Scalar>& v_rel) {
+        const auto partner = [&](std::uint32_t i, std::uint64_t id, const Vector3<Scalar>& v) {
+          return typename Collision<Scalar>::Partner{BodyId{id},
+                                                     bodies.masses()[i],
+                                                     bodies.radii()[i],
+                                                     !detail::isMovable(bodies, i),
+                                                     MaterialId{bodies.materials()[i]},
+                                                     v,
+                                                     Vector3<Scalar>(bodies.angularVelocities()[i])};
+        };
+        return collisionHook(Collision<Scalar>{
+            Scalar(time + impact.time), partner(impact.first, impact.key1, v1),
+            partner(impact.second, impact.key2, v2), impact.normal, v_rel, material, impact.speed});
+      };
+      blows = impacts_.resolve(bodies, near, domain, surfaces, walls, held, settings, nearBoundaries(bodies),
+                               course, decide);
+    } else {
+      blows = impacts_.resolve(bodies, near, domain, surfaces, walls, held, settings, nearBoundaries(bodies),
+                               course);
+    }
     neighbours_.add(impacts_.candidatesAdded(), bodies.ids());
     for (const TurnChange<Scalar>& turn : impacts_.turns()) {
       // The drift turns the body by the new spin for all of h.

@@ -18,10 +18,13 @@ auto Space<Scalar, Layout>::decideCollisions() -> std::vector<std::pair<BodyId, 
   if (!contact_.collisionHook) {
     return merges;
   }
+  for (const auto& [id1, id2] : contact_.merges()) {
+    merges.emplace_back(BodyId{id1}, BodyId{id2});
+  }
   const SimulationConfig<Scalar>& c = this->config_;
   const ContactOutcomes<Scalar> ends = decideContacts<Scalar>(
       contact_.contacts(), bodies_, contact_.collisionHook, Scalar(time_ + previous_dt_),
-      std::max(c.restitutionThreshold, c.epsilon), previous_dt_);
+      std::max(c.restitutionThreshold, c.epsilon), previous_dt_, contact_.merges());
   for (const auto& [id1, id2] : ends.merges) {
     merges.emplace_back(BodyId{id1}, BodyId{id2});
   }

@@ -167,6 +167,7 @@ struct SpaceNumbers {
   Vector3<Scalar> field;
   std::uint64_t steps, nextId;
   std::uint64_t ledgerOpen;
+  std::uint64_t stale;  ///< forces and contacts are to be found anew before the next step
 
   template <class Visitor>
   void forEach(Visitor&& visit) {
@@ -183,6 +184,7 @@ struct SpaceNumbers {
     visit("steps", steps);
     visit("nextId", nextId);
     visit("ledgerOpen", ledgerOpen);
+    visit("stale", stale);
   }
 };
 
@@ -198,17 +200,19 @@ void Space<Scalar, Layout>::save(const std::string& path) const {
       out.value(std::string("setting ") + setting.name, value);
     }
   });
-  detail::SpaceNumbers<Scalar> numbers{dt_,
-                                       previous_dt_,
-                                       time_,
-                                       timeRest_,
-                                       lastTotalEnergy_,
-                                       hookPower_,
-                                       left_,
-                                       force_.field,
-                                       steps_,
-                                       toInteger(bodies_.nextId()),
-                                       ledgerOpen_ ? std::uint64_t{1} : std::uint64_t{0}};
+  detail::SpaceNumbers<Scalar> numbers{
+      dt_,
+      previous_dt_,
+      time_,
+      timeRest_,
+      lastTotalEnergy_,
+      hookPower_,
+      left_,
+      force_.field,
+      steps_,
+      toInteger(bodies_.nextId()),
+      ledgerOpen_ ? std::uint64_t{1} : std::uint64_t{0},
+      !forcesValid_ || placesChanged() ? std::uint64_t{1} : std::uint64_t{0}};
   numbers.forEach([&](const char* name, const auto& value) { out.value(name, value); });
   contact_.save(out);
   saveBodies(bodies_, out);
@@ -258,6 +262,7 @@ void Space<Scalar, Layout>::restore(const std::string& path) {
   steps_ = static_cast<std::size_t>(numbers.steps);
   ledgerOpen_ = numbers.ledgerOpen != 0;
   rememberPlaces();
+  forcesValid_ = numbers.stale == 0;
 }
 
 }  // namespace gravel

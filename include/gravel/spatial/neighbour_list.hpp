@@ -202,8 +202,9 @@ class NeighbourList {
         continue;
       }
       using std::sqrt;
-      const S far = S(sqrt(wayOf(travel, j).squaredNorm()));
-      const S reach = radii_ij + slack + far + far;
+      // Another course may take it anywhere within its half of the skin, which is this far at most.
+      const S far = std::max<S>(S(sqrt(wayOf(travel, j).squaredNorm())), free_);
+      const S reach = radii_ij + slack + far;
       const Vector3<S> r = domain_.minimumImage(Vector3<S>(positions[j]) - x, time_);
       // The nearest point of the way: x + way s, 0 <= s <= 1.
       const S s = length_sq > S(0) ? std::min<S>(S(1), std::max<S>(S(0), S(way.dot(r) / length_sq))) : S(0);
