@@ -560,6 +560,7 @@ TEST_CASE("the least that is a Real solves contacts with the numbers of double")
   const auto contacts = contactsOf<R>(minimal, Material<R>{}, floorAtZero<R>());
   solver.solve(contacts, minimal, R(1e-3));
   CorrectionSettings<R> correction;
+  correction.precision = R(0);
   solver.correctPositions(minimal, correction);
   ContactSolver<double>().solve(contactsOf(doubles, Material<double>{}, floorAtZero<double>()), doubles,
                                 1e-3);

@@ -61,6 +61,7 @@ TEST_CASE("a crowd opens: largest overlap shrinks, centre of mass stays, no velo
   settings.factor = 0.5;
   settings.cap = 10.0;
   settings.tolerance = 1e-9;
+  settings.precision = 0;
   settings.maxIterations = 10000;
   PositionalCorrection<double> correction;
   correct(bodies, contacts, settings, correction);

@@ -92,11 +92,17 @@ TEST_CASE("a list is searched anew when, and only when, something made it stale,
   CHECK(update(0.1).empty());
   CHECK(std::string(list.reason()) == "no body has moved half the skin since the last search");
   cloud.positions[7][0] += 0.0049;
+  cloud.positions[8][0] += 0.0049;
   CHECK(update(0.2).empty());
   cloud.positions[7][0] += 0.0002;
-  CHECK(update(0.3) == "a body moved half the skin");
+  CHECK(update(0.25).empty());  // one of a hundred is compared with all others
+  cloud.positions[8][0] += 0.0002;
+  CHECK(update(0.3) == "bodies moved half the skin");
   cloud.positions[7] += Vector3<double>(100, 0, 0);
-  CHECK(update(0.4) == "a body moved half the skin");
+  CHECK(update(0.35).empty());
+  CHECK(list.strays());
+  cloud.positions[8] += Vector3<double>(100, 0, 0);
+  CHECK(update(0.4) == "bodies moved half the skin");
   cloud.radii[3] *= 1.0000001;
   CHECK(update(0.5) == "a radius changed");
   ++revision;
@@ -119,7 +125,7 @@ TEST_CASE("a body that teleports into another is a pair at once") {
   list.update(cloud.positions, cloud.radii, cloud.ids, 0, open, 0.0);
   cloud.positions[10] = cloud.positions[20] + Vector3<double>(0.05, 0, 0);
   const auto& pairs = list.update(cloud.positions, cloud.radii, cloud.ids, 0, open, 0.0);
-  CHECK(list.rebuilt());
+  CHECK_FALSE(list.rebuilt());  // it alone is looked for
   CHECK(overlapping(pairs, cloud, 0.0, open, 0.0) == fresh(cloud, 0.0, open, 0.0));
   CHECK_FALSE(pairs.empty());
 }
@@ -282,4 +288,55 @@ TEST_CASE("a user's own scalar has neighbour lists as well") {
   CHECK_FALSE(list.rebuilt());
   CHECK(overlapping(list.pairs(), plain, 0.0, Domain<double>::open(), 0.0) ==
         fresh(plain, 0.0, Domain<double>::open(), 0.0));
+}
+
+// Each body flies straight on; the list asked for before the flight holds for every moment of it, and where a
+// body turns off on the way, with what follow() adds.
+TEST_CASE(
+    "a list asked to hold for a whole way has every pair that meets on it, swift bodies and turns included") {
+  const auto open = Domain<double>::open();
+  const CounterRandom random(3);
+  std::size_t met = 0;
+  std::size_t searches = 0;
+  NeighbourList<double> list;
+  auto cloud = randomCloud<double>(300, 2.0, 0.03, 1.0, 58);
+  std::vector<Vector3<double>> ways(cloud.size());
+  for (std::uint64_t step = 0; step < 60; ++step) {
+    for (std::size_t i = 0; i < ways.size(); ++i) {
+      const double size = i % 100 == 0 ? 2.0 : 0.002;  // three bullets
+      for (int c = 0; c < 3; ++c) {
+        ways[i][c] = random.uniform(step * 1000 + 3 * i + static_cast<std::size_t>(c), -size, size);
+      }
+    }
+    list.update(cloud.positions, cloud.radii, cloud.ids, 0, open, 0.0, 0.0,
+                [&](std::size_t i) { return ways[i]; });
+    searches += list.rebuilt() ? 1U : 0U;
+    std::vector<Pair> late;
+    for (const std::uint32_t i : {17U, 200U}) {  // a slow one and a bullet turn off
+      ways[i] = Vector3<double>(random.uniform(step * 1000 + i + 900, -1.0, 1.0), 0.3, 0);
+      list.follow(
+          i, cloud.positions, cloud.radii, cloud.ids, ways[i], [&](std::size_t k) { return ways[k]; }, late);
+    }
+    list.add(late, cloud.ids);
+    const auto& pairs = list.pairs();
+    for (std::uint32_t i = 0; i < cloud.size(); ++i) {
+      for (std::uint32_t j = i + 1; j < cloud.size(); ++j) {
+        const Vector3<double> r = cloud.positions[j] - cloud.positions[i];
+        const Vector3<double> v = ways[j] - ways[i];
+        const double s = v.squaredNorm() > 0 ? std::clamp(-r.dot(v) / v.squaredNorm(), 0.0, 1.0) : 0.0;
+        if ((r + s * v).norm() < cloud.radii[i] + cloud.radii[j]) {
+          ++met;
+          const bool known = std::any_of(pairs.begin(), pairs.end(), [&](const Pair& pair) {
+            return (pair.first == i && pair.second == j) || (pair.first == j && pair.second == i);
+          });
+          CHECK(known);
+        }
+      }
+    }
+    for (std::size_t i = 0; i < ways.size(); ++i) {
+      cloud.positions[i] += ways[i];
+    }
+  }
+  CHECK(met > 500);
+  CHECK(searches < 30);
 }

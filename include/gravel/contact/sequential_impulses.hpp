@@ -45,6 +45,7 @@ class SequentialImpulses {
     S leastSize = Eigen::NumTraits<S>::highest();
     S sizeThen = leastSize;
     int age = 0;
+    int turns = 0;
     begin(problem);
     while (true) {
       const Progress now = everyColour(colouring, [&](std::size_t k) {
@@ -58,12 +59,14 @@ class SequentialImpulses {
       }
       if (settings.accelerate) {
         const S old = beta;
+        turns += now.along < S(0) ? 1 : 0;
         age = now.along < S(0) ? 0 : age + 1;
         leastSize = std::min<S>(leastSize, now.size);
         if (friction && report.iterations % stallSweeps == 0) {
-          if (!(leastSize < sizeThen / S(2))) {
+          if (turns > 2 && !(leastSize < sizeThen / S(2))) {
             return report;
           }
+          turns = 0;
           sizeThen = leastSize;
         }
         if (friction && now.size > S(4) * leastSize) {

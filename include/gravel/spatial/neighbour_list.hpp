@@ -163,6 +163,7 @@ class NeighbourList {
         if (!(S(4) * d_sq <= free_ * free_)) {  // a NaN too, for the search to refuse
           part.swift.push_back(static_cast<std::uint32_t>(i));
           part.lost = part.lost || !isFinite(d_sq);
+          part.most_sq = std::max<S>(part.most_sq, d_sq);
         } else if (d_sq > part.moved_sq) {
           part.moved_sq = d_sq;
         }
@@ -184,6 +185,9 @@ class NeighbourList {
       return nullptr;
     }
     moved_sq_ = std::max<S>(moved_sq_, free_ * free_ / S(4));
+    for (std::size_t c = 0; c < parts_.size() && swift_.size() > mostSwift(n); ++c) {
+      moved_sq_ = std::max<S>(moved_sq_, parts_[c].most_sq);
+    }
     return "bodies moved half the skin";
   }
 
@@ -341,6 +345,7 @@ class NeighbourList {
 
   struct Part {
     S moved_sq = S(0);
+    S most_sq = S(0);  ///< of the swift
     bool otherRadius = false;
     bool lost = false;
     std::vector<std::uint32_t> swift;
