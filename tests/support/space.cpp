@@ -1,0 +1,3 @@
+#include "support/space.hpp"
+
+template class gravel::Space<double, gravel::SoA>;
