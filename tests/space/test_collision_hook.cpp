@@ -51,7 +51,8 @@ TEST_CASE("A hook is told of each impact once: who, how fast, at which angle and
     CHECK(hit.second.radius == 0.6);
     CHECK(hit.second.velocity == Vec(2, 0, 0));
     CHECK(hit.second.angularVelocity == Vec(0, 0, 7));
-    const double late = 5e-3;  // met at the step's end
+    // Within the step the impact has its own time; by other integrators it is met at the step's end.
+    const double late = kind == IntegratorKind::VelocityVerlet ? 1e-9 : 5e-3;
     CHECK_THAT(hit.time, WithinAbs(1.5, late));
     CHECK_THAT(hit.sineOfAngle(), WithinAbs(0.6, late));
     CHECK_THAT(hit.impactSpeed, WithinAbs(1.6, 2 * late));
@@ -103,6 +104,7 @@ TEST_CASE("Three in a row that meet in one step become one") {
   space.setCollisionHook(mergeAll);
   space.computeDynamics(0);
   REQUIRE(space.n() == 1);
+  CHECK(space.body(0).id() == BodyId{1});  // the first to have grown heavier is that of the first impact
   CHECK(space.body(0).mass() == 3.0);
   CHECK_THAT(space.body(0).velocity()[0], WithinRel(-2.0 / 3, 1e-14));
   CHECK(space.contactCount() == 0);
@@ -127,7 +129,7 @@ TEST_CASE("Velocities of the user's own are what the bodies leave with, at the t
     CHECK(space.body(0).angularVelocity() == Vec(0, 3, 0));
     CHECK(space.body(1).velocity() == Vec(-1, 0, 0));
     CHECK(space.body(1).angularVelocity() == Vec(0, 0, 4));
-    const double late = 0.05;  // met at the step's end
+    const double late = kind == IntegratorKind::VelocityVerlet ? 1e-9 : 0.05;
     CHECK((space.body(0).position() - (2 - 1.004) * Vec(1, 0, 2)).norm() < late);
     CHECK_THAT(space.energyLedger().total(), WithinRel(before, 1e-13));
     CHECK(space.energyLedger().restitution < -2.0);  // put in

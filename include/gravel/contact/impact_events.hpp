@@ -97,6 +97,11 @@ struct StraightCourse {
   Vector3<S> acceleration(const B& bodies, std::size_t i) const {
     return bodies.accelerations()[i];
   }
+  /// Velocity [m s^-1] at t [s] since the start of the step of length h.
+  template <class B>
+  Vector3<S> velocityAt(const B& bodies, std::size_t i, const S& t, const S& h) const {
+    return velocity(bodies, i) + acceleration(bodies, i) * (t - h / S(2));
+  }
   /// \param strokes changes of velocity [m s^-1] one after another, each to be multiplied by `share`
   /// \param t [s] since the start of the step
   template <class B>
@@ -529,7 +534,9 @@ class ImpactEvents {
     const S k = bodies.inertiaFactors()[i];
     side.movable = detail::isMovable(bodies, i);
     side.mass = bodies.masses()[i];
-    side.v = scene.velocity(i) + scene.acceleration(i) * (t - scene.settings.h / S(2));
+    if (side.movable) {
+      side.v = scene.course.velocityAt(bodies, i, t, scene.settings.h);
+    }
     side.s = r * Vector3<S>(bodies.angularVelocities()[i]);
     side.r = r;
     side.c = r > S(0) ? S(arm / r) : S(0);

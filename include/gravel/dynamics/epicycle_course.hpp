@@ -36,6 +36,14 @@ class EpicycleCourse {
     return motion_[i].a + Vector3<Scalar>(bodies.accelerations()[i]);
   }
 
+  /// Along the epicycle itself, so that what a blow does to the energy is exact.
+  template <class B>
+  Vector3<Scalar> velocityAt(const B& bodies, std::size_t i, const Scalar& t, const Scalar& h) const {
+    Vector3<Scalar> dx, dv;
+    Epicycle<Scalar>(frame_, t).increments(bodies.positions()[i], bodies.velocities()[i], dx, dv);
+    return bodies.velocities()[i] + dv + bodies.accelerations()[i] * (t - h / Scalar(2));
+  }
+
   template <class B>
   void push(B& bodies, std::size_t i, const Scalar& share, const std::array<Vector3<Scalar>, 3>& strokes,
             const Scalar& t) {

@@ -1,0 +1,129 @@
+#include "laws/laws.hpp"
+#include "scenes/gas.hpp"
+#include "support/catch.hpp"
+
+// Hard spheres of diameter 1, mass 1 and temperature 1 in a periodic cube.
+
+using namespace gravel;
+using namespace gravel::test;
+
+namespace {
+
+double temperature(const Space<double>& space) {
+  return 2.0 / 3.0 * std::get<0>(space.calculateSystemEnergy()) / static_cast<double>(space.n());
+}
+
+}  // namespace
+
+// Runs event by event of 500 spheres; Enskog's and Carnahan & Starling's formulas are within 0.6 % of these.
+// A run of H hits has the relative noise 1/sqrt(H) in their number, and about 1/sqrt(H) in the sum of the
+// momenta that they carry (its distribution has the variance (4 - pi)/pi).
+TEST_CASE("A gas has the collision rate and the pressure of hard spheres, at three densities") {
+  struct Row {
+    double fraction, compressibility, rate, time;
+  };
+  for (const Row& row :
+       {Row{0.05, 1.22934, 0.77468, 30}, Row{0.10, 1.52214, 1.76162, 15}, Row{0.20, 2.40630, 4.76434, 6}}) {
+    scenes::GasOptions options;
+    options.count = 256;
+    options.fraction = row.fraction;
+    Space<double> space = scenes::gasBox(options);
+    advance(space, 200);
+    scenes::GasStatistics gas;
+    const auto steps = static_cast<std::size_t>(row.time / options.timeStep);
+    for (std::size_t i = 0; i < steps; ++i) {
+      space.computeDynamics(i);
+      gas.sample(space);
+    }
+    CAPTURE(row.fraction, gas.hits(), gas.rate() / row.rate, gas.compressibility(1.0) / row.compressibility);
+    CHECK(gas.hits() > 2500);
+    const double noise = 1.0 / std::sqrt(gas.hits());
+    CHECK_THAT(gas.rate(), WithinRel(row.rate, 4 * noise));
+    CHECK_THAT(gas.compressibility(1.0) - 1, WithinRel(row.compressibility - 1, 5 * noise));
+    CHECK_THAT(temperature(space), WithinRel(1.0, 1e-12));  // thousands of hits, none of which costs energy
+  }
+}
+
+// All start at one speed. After 20 hits a body the components of the velocities are normal: the largest
+// distance of the distribution functions, times sqrt(n), is below 1.63 with 99 % (Kolmogorov 1933).
+TEST_CASE("Hits bring velocities to Maxwell's distribution") {
+  scenes::GasOptions options;
+  options.count = 400;
+  options.fraction = 0.25;
+  Space<double> space = scenes::gasBox(options);
+  const CounterRandom random(77);
+  for (std::size_t i = 0; i < space.n(); i += 2) {
+    const Vec v = std::sqrt(3.0) * random.direction(i);
+    space.body(i).velocity() = v;
+    space.body(i + 1).velocity() = -v;
+  }
+  const auto distance = [&] {
+    std::vector<double> components;
+    for (std::size_t i = 0; i < space.n(); ++i) {
+      for (int c = 0; c < 3; ++c) {
+        components.push_back(space.body(i).velocity()[c]);
+      }
+    }
+    std::sort(components.begin(), components.end());
+    const auto n = static_cast<double>(components.size());
+    double worst = 0.0;
+    for (std::size_t k = 0; k < components.size(); ++k) {
+      const double normal = 0.5 * std::erfc(-components[k] / std::sqrt(2.0));
+      worst = std::max({worst, std::abs(normal - double(k) / n), std::abs(normal - double(k + 1) / n)});
+    }
+    return worst * std::sqrt(n);
+  };
+  CHECK(distance() > 1.63);  // components of vectors of one length are even, not normal
+  scenes::GasStatistics gas;
+  for (std::size_t i = 0; 2 * gas.hits() < 20.0 * 400; ++i) {
+    space.computeDynamics(i);
+    gas.sample(space);
+  }
+  CHECK(distance() < 1.63);
+}
+
+// T = T0/(1 + t/tau)^2 with 1/tau = (1 - e^2) omega_0/6 (1 + 3 a_2/16) (Haff 1983; van Noije & Ernst 1998).
+// The energy of H hits has the relative noise 1/sqrt(H), and so has sqrt(T0/T) - 1.
+TEST_CASE("A gas of inelastic spheres cools by Haff's law") {
+  scenes::GasOptions options;
+  options.count = 500;
+  options.fraction = 0.05;
+  options.restitution = 0.9;
+  options.timeStep = 0.01;
+  Space<double> space = scenes::gasBox(options);
+  const double e = options.restitution;
+  const double a2 = 16 * (1 - e) * (1 - 2 * e * e) / (81 - 17 * e + 30 * e * e * (1 - e));
+  const double rate = (1 - e * e) * 0.77468 / 6 * (1 + 3 * a2 / 16);
+  scenes::GasStatistics gas;
+  for (std::size_t i = 0; i < 4000; ++i) {
+    space.computeDynamics(i);
+    gas.sample(space);
+  }
+  CAPTURE(gas.hits());
+  CHECK(gas.hits() > 4000);
+  CHECK_THAT(std::sqrt(1 / temperature(space)) - 1,
+             WithinRel(rate * space.time(), 4 / std::sqrt(gas.hits())));
+  const EnergyLedger<double> ledger = space.energyLedger();
+  CHECK_THAT(ledger.total(), WithinRel(750.0, 1e-12));
+}
+
+// Below e = 7 - 4 sqrt 3 three balls on a line hit each other infinitely often in a finite time (Bernu &
+// Mazighi 1990; McNamara & Young 1992). The steps must go on, and the balls end together.
+TEST_CASE("Inelastic collapse of three balls on a line ends") {
+  for (const double e : {0.0, 0.02, 0.07}) {
+    SimulationConfig<double> config = plain(1e-3);
+    config.coeffRestitution = e;
+    Space<double> space(config);
+    space.addBody(ball({-1.2, 0, 0}, {1, 0, 0}, 0.5));
+    space.addBody(ball({0, 0, 0}, {0, 0, 0}, 0.5));
+    space.addBody(ball({1.2, 0, 0}, {-1, 0, 0}, 0.5));
+    advance(space, 2000);
+    CAPTURE(e);
+    for (std::size_t i = 0; i < 3; ++i) {
+      CHECK(space.body(i).velocity().norm() < 1e-3);
+    }
+    CHECK(space.conserved().momentum.norm() < 1e-14);
+    CHECK(space.body(2).position()[0] - space.body(0).position()[0] < 2.01);
+    CHECK_THAT(space.energyLedger().total(), WithinRel(1.0, 1e-13));
+  }
+}
