@@ -14,13 +14,13 @@ namespace gravel {
 /// 2002, J. Comput. Phys. 179, 27). Takes what DirectSum takes and gives the same numbers within a tolerance.
 ///
 /// Error: the rms of |a - a_exact| / |a_exact| over the bodies stays below the tolerance, but for rounding
-/// (1e-14 in double, 1e-6 in float), and the 99.99th percentile below ten times that; where |a_exact| is less
-/// than a hundredth of the mean, relative to that. Pairs of cells are taken as far when the error expected of
-/// them is a set share of the acceleration of the sink, which a rough first pass over the cells finds. The
-/// potential energy errs by less than the tolerance, relative. Both directions of a pair of cells are of the
-/// same terms, so that the total force vanishes to rounding.
+/// (1e-14 in double, 1e-6 in float), and the 99.99th percentile below ten times that; of accelerations below
+/// a hundredth (rms) or a tenth (percentile) of the mean, relative to those. Pairs of cells are taken as far
+/// when the error expected of them is a set share of the acceleration of the sink, which a rough first pass
+/// over the cells finds. The potential energy errs by less than the tolerance, relative. Both directions of a
+/// pair of cells are of the same terms, so that the total force vanishes to rounding.
 ///
-/// Cost: O(N) but for the sort; the memory of the tree is about 1 kB a body at the default tolerance. The
+/// Cost: O(N) but for the sort; memory about 300 bytes a body at the default tolerance. The
 /// result is a function of the input alone: not of earlier calls, nor of the number of threads. One object
 /// serves one caller at a time; up to 2^32 - 1 bodies.
 template <Real S>
