@@ -2,7 +2,7 @@
 
 /// What the law tests share: a quiet configuration, short ways to make bodies, and all bits of a state.
 
-#include <gravel/space/space.hpp>
+#include "support/space.hpp"
 
 #include <cstring>
 #include <vector>

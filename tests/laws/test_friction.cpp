@@ -147,6 +147,8 @@ TEST_CASE("A pair that turns as one parts exactly above the frequency sqrt(G m /
     const double gap = (space.body(1).position() - space.body(0).position()).norm() - 1;
     CAPTURE(factor, gap);
     CHECK((gap > 1e-2) == (factor > 1));
-    CHECK((std::abs(gap) < 1e-5) == (factor < 1));
+    // Half a kick, v = a h/2 with a = 2, may throw the pair up against what is left of its pull, a (1 -
+    // factor), to v^2/(2 a (1 - factor)).
+    CHECK((std::abs(gap) < 2 * 1e-6 / (8 * std::abs(1 - factor)) + 4e-6) == (factor < 1));
   }
 }
