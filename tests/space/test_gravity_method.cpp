@@ -1,3 +1,4 @@
+#include "support/space.hpp"
 #include "support/catch.hpp"
 #include "support/temporary_file.hpp"
 #include <gravel/gravel.hpp>

@@ -1,5 +1,6 @@
 // A program written against the reference's class page, with its names and nothing else of gravel's.
 
+#include "support/space.hpp"
 #include "support/catch.hpp"
 #include <gravel/model.hpp>
 

@@ -1,3 +1,4 @@
+#include "support/space.hpp"
 #include "space/quiet_spaces.hpp"
 #include "support/catch.hpp"
 #include <gravel/space/space.hpp>

@@ -6,104 +6,12 @@
 
 #include <gravel/contact/contact_coloring.hpp>
 #include <gravel/contact/contact_settings.hpp>
+#include <gravel/contact/solver_rows.hpp>
 #include <gravel/core/parallel.hpp>
 
 #include <vector>
 
 namespace gravel {
-
-namespace detail {
-
-template <Real S>
-struct SolverBody {
-  Vector3<S> v;
-  S inverseMass;
-  Vector3<S> s;  ///< r w: speed of the surface
-  S spin;        ///< 1/(k m)
-};
-
-template <Real S>
-struct SolverRow {
-  Vector3<S> n;
-  S c1;  ///< arm / radius
-  S c2;
-  S normalMass;          ///< 1/(1/m1 + 1/m2)
-  S tangentialMass;      ///< 1/(1/m1 (1 + c1^2/k1) + 1/m2 (1 + c2^2/k2))
-  S tangentialMobility;  ///< 1/tangentialMass
-  S target;              ///< v_n after the blow is at least this
-  S staticFriction;
-  S kineticFriction;
-  S jn;
-  Vector3<S> jt;
-  S stepN;  ///< of the impulses, from sweep to sweep
-  Vector3<S> stepT;
-  std::uint32_t slot1;
-  std::uint32_t slot2;
-  std::uint32_t contact;
-  bool impact;
-  bool sliding;
-  std::uint8_t slides;  ///< how often it went from sticking to sliding
-};
-
-/// Resistance to rolling and spinning of a row; see resistTurning().
-template <Real S>
-struct TurningRow {
-  S q1 = S(0);  ///< effective radius / radius
-  S q2 = S(0);
-  S mass = S(0);  ///< 1/(q1^2/(k1 m1) + q2^2/(k2 m2))
-  S rolling = S(0);
-  S spinning = S(0);
-  Vector3<S> l = Vector3<S>::Zero();
-  Vector3<S> step = Vector3<S>::Zero();
-
-  Vector3<S> rho(const SolverBody<S>& b1, const SolverBody<S>& b2) const { return q2 * b2.s - q1 * b1.s; }
-};
-
-template <Real S>
-S normalVelocity(const SolverRow<S>& row, const SolverBody<S>& b1, const SolverBody<S>& b2) {
-  return row.n.dot(Vector3<S>(b2.v - b1.v));
-}
-
-template <Real S>
-Vector3<S> slipVelocity(const SolverRow<S>& row, const SolverBody<S>& b1, const SolverBody<S>& b2) {
-  const Vector3<S> v_rel = b2.v - b1.v;
-  return v_rel - row.n.dot(v_rel) * row.n - Vector3<S>(row.c1 * b1.s + row.c2 * b2.s).cross(row.n);
-}
-
-/// v += 2^exponent, exactly; a scalar that is not built in stays as it is.
-template <Real S>
-S scaled(const S& x, int exponent) {
-  if constexpr (std::is_floating_point_v<S>) {
-    return exponent == 0 ? x : std::ldexp(x, exponent);
-  } else {
-    return x;
-  }
-}
-
-template <Real S>
-Vector3<S> scaled(const Vector3<S>& v, int exponent) {
-  return exponent == 0
-             ? v
-             : Vector3<S>(scaled<S>(v[0], exponent), scaled<S>(v[1], exponent), scaled<S>(v[2], exponent));
-}
-
-/// Power of two that brings numbers between low and high near 1; 0 while they are harmless anyway.
-template <Real S>
-int scaleExponent(const S& low, const S& high) {
-  if constexpr (std::is_floating_point_v<S>) {
-    constexpr int harmless = std::numeric_limits<S>::max_exponent / 5;
-    int lowExponent = 0;
-    int highExponent = 0;
-    (void)std::frexp(low, &lowExponent);
-    (void)std::frexp(high, &highExponent);
-    if (high > S(0) && (highExponent > harmless || lowExponent < -harmless)) {
-      return -(lowExponent + highExponent) / 2;
-    }
-  }
-  return 0;
-}
-
-}  // namespace detail
 
 /// The problem of one step. Speeds and masses far from 1 are scaled by powers of two, which is exact, so that
 /// dust at 1e-310 m/s neither vanishes nor crawls through subnormal arithmetic.

@@ -7,6 +7,7 @@
 /// friction, a vector of the tangent plane, within Coulomb's cone.
 
 #include <gravel/contact/contact_energy.hpp>
+#include <gravel/contact/row_impulses.hpp>
 
 namespace gravel {
 
@@ -21,7 +22,18 @@ namespace gravel {
 /// Shares the contacts of a large colour between threads; the same bits for any number of threads.
 /// O(contacts) a sweep.
 template <Real S>
-class SequentialImpulses {
+class SequentialImpulses : private detail::RowImpulses<S> {
+  using Base = detail::RowImpulses<S>;
+  using Base::push;
+  using Base::resist;
+  using Base::rub;
+  using Base::rubbed;
+  using Base::turn;
+  using Base::twist;
+  using typename Base::Body;
+  using typename Base::Progress;
+  using typename Base::Row;
+
  public:
   static constexpr const char* name() { return "sequential impulses"; }
 
@@ -79,25 +91,8 @@ class SequentialImpulses {
   }
 
  private:
-  using Row = detail::SolverRow<S>;
-  using Body = detail::SolverBody<S>;
   static constexpr std::size_t chunk = 512;
-  static constexpr std::uint8_t patience = 8;
   static constexpr int stallSweeps = 32;
-
-  /// What a sweep did: largest change of a velocity, squared; and products, over mass, of the changes of the
-  /// impulses with the whole step since the sweep before, and with themselves.
-  struct Progress {
-    S change_sq = S(0);
-    S along = S(0);
-    S size = S(0);
-    Progress& operator+=(const Progress& other) {
-      change_sq = std::max<S>(change_sq, other.change_sq);
-      along += other.along;
-      size += other.size;
-      return *this;
-    }
-  };
 
   /// Step of a body's velocities from sweep to sweep.
   struct BodyStep {
@@ -158,25 +153,6 @@ class SequentialImpulses {
       all += f(k);
     }
     return all;
-  }
-
-  static void push(Body& b1, Body& b2, const Vector3<S>& j) {
-    if (b1.inverseMass > S(0)) {  // immovable bodies are shared between threads: never written
-      b1.v -= b1.inverseMass * j;
-    }
-    if (b2.inverseMass > S(0)) {
-      b2.v += b2.inverseMass * j;
-    }
-  }
-
-  static void twist(const Row& row, Body& b1, Body& b2, const Vector3<S>& j) {
-    const Vector3<S> turn = row.n.cross(j);
-    if (b1.inverseMass > S(0)) {
-      b1.s -= (row.c1 * b1.spin) * turn;
-    }
-    if (b2.inverseMass > S(0)) {
-      b2.s -= (row.c2 * b2.spin) * turn;
-    }
   }
 
   static Progress applyGuess(ContactProblem<S>& problem, std::size_t k) {
@@ -283,67 +259,6 @@ class SequentialImpulses {
       }
     }
     return progress;
-  }
-
-  /// Friction of a row for its normal impulse. Sizes are compared as speeds, which are of order one.
-  /// \return the change of the tangential impulse
-  static Vector3<S> rubbed(Row& row, const Vector3<S>& slip, Progress& progress) {
-    using std::sqrt;
-    Vector3<S> jt = row.jt - row.tangentialMass * slip;
-    const S size_sq = Vector3<S>(row.tangentialMobility * jt).squaredNorm();
-    // A contact that keeps changing its mind between sticking and sliding slides: sweeps must end.
-    const S stick =
-        (row.slides < patience ? row.staticFriction : row.kineticFriction) * row.jn * row.tangentialMobility;
-    const bool slides = size_sq > stick * stick;
-    if (slides) {
-      row.slides = static_cast<std::uint8_t>(row.slides + (row.sliding ? 0U : 1U));
-      jt *= row.kineticFriction * row.jn * row.tangentialMobility / S(sqrt(size_sq));
-    }
-    row.sliding = slides;
-    const Vector3<S> dj = jt - row.jt;
-    row.jt = jt;
-    row.stepT += dj;
-    const Vector3<S> change = row.tangentialMobility * dj;
-    progress += {change.squaredNorm(), change.dot(row.stepT), change.dot(dj)};
-    return dj;
-  }
-
-  static Progress rub(ContactProblem<S>& problem, std::size_t k, Body& b1, Body& b2) {
-    Row& row = problem.rows[k];
-    Vector3<S> slip = detail::slipVelocity(row, b1, b2);
-    if (!problem.slipTargets.empty()) {
-      slip -= problem.slipTargets[k];
-    }
-    Progress progress;
-    const Vector3<S> dj = rubbed(row, slip, progress);
-    push(b1, b2, dj);
-    twist(row, b1, b2, dj);
-    return progress;
-  }
-
-  static void turn(const detail::TurningRow<S>& row, Body& b1, Body& b2, const Vector3<S>& l) {
-    if (b1.inverseMass > S(0)) {
-      b1.s -= (row.q1 * b1.spin) * l;
-    }
-    if (b2.inverseMass > S(0)) {
-      b2.s += (row.q2 * b2.spin) * l;
-    }
-  }
-
-  /// Resistance to rolling and spinning of a row for its normal impulse.
-  static Progress resist(ContactProblem<S>& problem, std::size_t k, Body& b1, Body& b2) {
-    detail::TurningRow<S>& row = problem.turning[k];
-    if (!(row.mass > S(0))) {
-      return {};
-    }
-    const Vector3<S> l = resistTurning<S>(Vector3<S>(row.l - row.mass * row.rho(b1, b2)), problem.rows[k].n,
-                                          problem.rows[k].jn, row.rolling, row.spinning);
-    const Vector3<S> dl = l - row.l;
-    row.l = l;
-    row.step += dl;
-    turn(row, b1, b2, dl);
-    const Vector3<S> change = dl / row.mass;
-    return {change.squaredNorm(), change.dot(row.step), change.dot(dl)};
   }
 
   std::vector<BodyStep> bodySteps_;

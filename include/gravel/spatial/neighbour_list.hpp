@@ -4,13 +4,11 @@
 /// Candidate pairs that are found with a skin and kept until a body has moved half of it (Verlet 1967).
 
 #include <gravel/spatial/broad_phase.hpp>
+#include <gravel/spatial/strays.hpp>
 
 #include <optional>
 
 namespace gravel {
-
-/// Bodies that stay where they are for as long as the list is asked to hold.
-struct AtRest {};
 
 /// Keeps the pairs of one search for as long as they are certain to hold every pair within reach. They are
 /// always a superset of what a fresh search would give, so that the skin has no say in any result.
@@ -45,7 +43,8 @@ class NeighbourList {
     }
     for (const std::uint32_t i : swift_) {
       ++comparisons_;
-      compare(i, positions, radii, ids, wayOf(travel, i), travel, extra_);
+      detail::compare(i, positions, radii, ids, detail::wayOf<S>(travel, i), travel, S(room_ - skin_), free_,
+                      domain_, time_, extra_);
     }
     join(ids);
     return pairs();
@@ -68,7 +67,7 @@ class NeighbourList {
     if (!(S(4) * std::max<S>(from_sq, to_sq) <= free_ * free_)) {
       ++comparisons_;
       strays_ = true;
-      compare(i, positions, radii, ids, way, travel, out);
+      detail::compare(i, positions, radii, ids, way, travel, S(room_ - skin_), free_, domain_, time_, out);
     }
   }
 
@@ -115,15 +114,6 @@ class NeighbourList {
   void clear() { built_ = false; }
 
  private:
-  template <class Travel>
-  static Vector3<S> wayOf(const Travel& travel, std::size_t i) {
-    if constexpr (std::is_same_v<Travel, AtRest>) {
-      return Vector3<S>::Zero();
-    } else {
-      return travel(i);
-    }
-  }
-
   /// nullptr if the list still holds, but for the swift.
   template <class Positions, class Radii, class Travel>
   const char* whatIsStale(const Positions& positions, const Radii& radii, std::uint64_t revision,
@@ -191,37 +181,6 @@ class NeighbourList {
     return "bodies moved half the skin";
   }
 
-  /// Appends the pairs of body i on its way, with others on theirs.
-  template <class Positions, class Radii, class Ids, class Travel>
-  void compare(std::uint32_t i, const Positions& positions, const Radii& radii, const Ids& ids,
-               const Vector3<S>& way, const Travel& travel, std::vector<Pair>& out) const {
-    const Vector3<S> x = positions[i];
-    const S length_sq = way.squaredNorm();
-    const S r_i = radii[i];
-    const std::uint64_t id = detail::idKey(ids[i]);
-    const S slack = room_ - skin_;
-    for (std::uint32_t j = 0; j < positions.size(); ++j) {
-      const S radii_ij = r_i + radii[j];
-      if (j == i || !(radii_ij > S(0))) {
-        continue;
-      }
-      using std::sqrt;
-      // Another course may take it anywhere within its half of the skin, which is this far at most.
-      const S far = std::max<S>(S(sqrt(wayOf(travel, j).squaredNorm())), free_);
-      const S reach = radii_ij + slack + far;
-      const Vector3<S> r = domain_.minimumImage(Vector3<S>(positions[j]) - x, time_);
-      // The nearest point of the way: x + way s, 0 <= s <= 1.
-      const S s = length_sq > S(0) ? std::min<S>(S(1), std::max<S>(S(0), S(way.dot(r) / length_sq))) : S(0);
-      if (Vector3<S>(r - s * way).squaredNorm() <= reach * reach * (S(1) + S(16) * roundoff())) {
-        if (id < detail::idKey(ids[j])) {
-          out.push_back({i, j});
-        } else {
-          out.push_back({j, i});
-        }
-      }
-    }
-  }
-
   /// pairs_ and extra_ in one list, in the order of ids.
   template <class Ids>
   void join(const Ids& ids) {
@@ -262,7 +221,7 @@ class NeighbourList {
     skin_ = fixedSkin_ ? *fixedSkin_ : chooseSkin(mean, motionSeen);
     swift_.clear();
     if constexpr (!std::is_same_v<Travel, AtRest>) {
-      skin_ = std::max<S>(skin_, takeSwift(n, travel));
+      skin_ = std::max<S>(skin_, detail::takeSwift(n, mostSwift(n), skin_, travel, ways_, order_, swift_));
     }
     free_ = skin_;
     flow_ = S(0);
@@ -273,47 +232,13 @@ class NeighbourList {
     if (!domain.isOpen()) {
       scale += domain.lengths().maxCoeff();
     }
-    const S slack = S(32) * roundoff() * scale;
+    const S slack = S(32) * detail::roundoff<S>() * scale;
     search_.findPairs(positions, radii, ids, S(room_ + slack), domain, time, pairs_);
     revision_ = revision;
     domain_ = domain;
     time_ = time;
     updates_ = 0;
     built_ = true;
-  }
-
-  /// The bodies that may outrun any skin, at most mostSwift(n) of them, fastest first.
-  /// \return [m] twice the way of the next one
-  template <class Travel>
-  S takeSwift(std::size_t n, const Travel& travel) {
-    using std::sqrt;
-    ways_.resize(n);
-    for (std::size_t i = 0; i < n; ++i) {
-      ways_[i] = wayOf(travel, i).squaredNorm();
-      if (!isFinite(ways_[i])) {
-        return S(0);  // the search will say which
-      }
-    }
-    if (n == 0) {
-      return S(0);
-    }
-    order_.resize(n);
-    std::iota(order_.begin(), order_.end(), 0U);
-    const std::size_t most = std::min(mostSwift(n), n - 1);
-    const auto faster = [&](std::uint32_t a, std::uint32_t b) {
-      return ways_[a] > ways_[b] || (ways_[a] == ways_[b] && a < b);
-    };
-    std::nth_element(order_.begin(), order_.begin() + static_cast<std::ptrdiff_t>(most), order_.end(),
-                     faster);
-    const S enough = S(2) * S(sqrt(ways_[order_[most]]));
-    const S skin = std::max<S>(skin_, enough);
-    for (std::size_t k = 0; k < most; ++k) {
-      if (S(4) * ways_[order_[k]] > skin * skin) {
-        swift_.push_back(order_[k]);
-      }
-    }
-    std::sort(swift_.begin(), swift_.end());
-    return enough;
   }
 
   /// So thick that the list would have held for `goodLife` updates of the motion last seen, within a fraction
@@ -331,11 +256,6 @@ class NeighbourList {
       return S(0);
     }
     return std::min(std::max(S(S(goodLife) * perUpdate), thinnest), thickest);
-  }
-
-  static S roundoff() {
-    using Limits = std::numeric_limits<S>;
-    return Limits::is_specialized ? S(Limits::epsilon()) : S(std::numeric_limits<double>::epsilon());
   }
 
   static constexpr std::size_t chunk = 8192;

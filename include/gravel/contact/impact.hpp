@@ -1,0 +1,173 @@
+#pragma once
+
+/// \file
+/// Impacts inside a step: what they are, what is asked of them and what is reported; and how bodies drift
+/// meanwhile.
+
+#include <gravel/contact/contact_bodies.hpp>
+#include <gravel/contact/contact_settings.hpp>
+#include <gravel/contact/time_of_impact.hpp>
+#include <gravel/spatial/pair.hpp>
+
+#include <array>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace gravel {
+
+template <Real Scalar>
+struct ImpactSettings {
+  Scalar time = Scalar(0);                  ///< [s] at the start, for a sheared domain
+  Scalar h = Scalar(0);                     ///< [s] >= 0
+  Scalar restitutionThreshold = Scalar(0);  ///< [m s^-1] a slower approach stops
+  Scalar epsilon = Scalar(0);               ///< [m] centres closer than this count as one point
+  /// What approaches a body after so many impacts of it in the step is left to the solver of simultaneous
+  /// contacts, which ends every cascade. An impact counts 1 - e + 1/32, since only those that lose energy can
+  /// go on for ever; further bounces from the same partner, of which the number is bounded otherwise, 1/32.
+  Scalar mostPerBody = Scalar(8);
+};
+
+/// One blow.
+template <Real Scalar>
+struct Impact {
+  std::uint32_t first;   ///< index of the body of the smaller id
+  std::uint32_t second;  ///< index of the other, or `staticPartner`
+  std::uint64_t key1;
+  std::uint64_t key2;
+  Scalar time;                     ///< [s] since the start of the step
+  Scalar speed;                    ///< [m s^-1] of approach
+  Vector3<Scalar> normal;          ///< from the first to the second
+  Scalar distance;                 ///< [m] of the centres; to a boundary the radius
+  ContactImpulse<Scalar> impulse;  ///< on the second
+  bool rests;                      ///< it stays in contact for the rest of the step
+  Scalar settle;  ///< [s] since the start of the step: when the last of its bounces is over, if it rests
+  bool decided = false;  ///< by somebody else's outcome: the two take no notice of each other in this step
+};
+
+/// A body that began to turn otherwise inside the step.
+template <Real Scalar>
+struct TurnChange {
+  std::uint32_t body;
+  Scalar time;  ///< [s] since the start of the step
+  Vector3<Scalar> before;
+  Vector3<Scalar> after;
+};
+
+template <Real Scalar>
+struct ImpactReport {
+  std::size_t impacts = 0;
+  std::size_t postponed = 0;  ///< bodies that reached `mostPerBody`
+  Scalar restitutionLoss = Scalar(0);
+  Scalar frictionLoss = Scalar(0);
+  Scalar driftWork = Scalar(0);
+};
+
+/// Nobody else decides what an impact does.
+struct NoDecision {};
+
+/// Candidates that are known to suffice for every course that a body may take.
+struct FixedCandidates {
+  std::span<const Pair> list;
+
+  std::span<const Pair> pairs() const { return list; }
+  static std::uint64_t version() { return 0; }
+  template <class B, class S>
+  void follow(const B&, std::uint32_t, const S&, std::vector<Pair>&) {}
+};
+
+/// How bodies drift: straight on. A course tells the mean velocity of body i over the step, x + v h being the
+/// place at its end, and the acceleration that bends its path; and deals a blow so that the same drift ends
+/// where the body is afterwards.
+template <Real S>
+struct StraightCourse {
+  template <class B>
+  Vector3<S> velocity(const B& bodies, std::size_t i) const {
+    return bodies.velocities()[i];
+  }
+  template <class B>
+  Vector3<S> acceleration(const B& bodies, std::size_t i) const {
+    return bodies.accelerations()[i];
+  }
+  /// Velocity [m s^-1] at t [s] since the start of the step of length h.
+  template <class B>
+  Vector3<S> velocityAt(const B& bodies, std::size_t i, const S& t, const S& h) const {
+    return velocity(bodies, i) + acceleration(bodies, i) * (t - h / S(2));
+  }
+  /// \param strokes changes of velocity [m s^-1] one after another, each to be multiplied by `share`
+  /// \param t [s] since the start of the step
+  template <class B>
+  void push(B& bodies, std::size_t i, const S& share, const std::array<Vector3<S>, 3>& strokes, const S& t) {
+    const Vector3<S> before = bodies.velocities()[i];
+    for (const Vector3<S>& dv : strokes) {
+      bodies.velocities()[i] += share * dv;
+    }
+    bodies.positions()[i] -= t * Vector3<S>(Vector3<S>(bodies.velocities()[i]) - before);
+  }
+};
+
+namespace detail {
+
+/// An impact to come; void if a body has been through another one since.
+template <Real S>
+struct ImpactEvent {
+  S t;
+  std::uint32_t first;
+  std::uint32_t second;
+  std::uint64_t key1;
+  std::uint64_t key2;
+  std::uint32_t stamp1 = 0;
+  std::uint32_t stamp2 = 0;
+  std::uint32_t wall = 0;
+};
+
+template <Real S>
+bool comesAfter(const ImpactEvent<S>& a, const ImpactEvent<S>& b) {
+  if (a.t != b.t) {
+    return b.t < a.t;
+  }
+  return a.key1 != b.key1 ? b.key1 < a.key1 : b.key2 < a.key2;
+}
+
+template <Real S>
+struct ImpactHistory {
+  std::uint32_t impacts = 0;
+  std::uint32_t rests = std::numeric_limits<std::uint32_t>::max();  ///< the last one that rests, of which
+                                                                    ///< this is the first body
+  std::uint64_t partner = 0;                                        ///< of the last one
+  S spent = S(0);
+};
+
+template <Real S>
+struct ImpactSide {
+  Vector3<S> v = Vector3<S>::Zero();
+  Vector3<S> s = Vector3<S>::Zero();  ///< speed of the surface, r w
+  S c = S(0);                         ///< arm / radius
+  S spin = S(0);                      ///< 1/k; 0 if it cannot turn
+  bool movable = false;
+  S mass = S(0);
+  S r = S(0);
+};
+
+/// A side of a blow at the moment t of a step.
+template <Real S, class Scene>
+ImpactSide<S> impactSide(const Scene& scene, std::uint32_t i, const S& arm, const S& t) {
+  const auto& bodies = scene.bodies;
+  ImpactSide<S> side;
+  const S r = bodies.radii()[i];
+  const S k = bodies.inertiaFactors()[i];
+  side.movable = detail::isMovable(bodies, i);
+  side.mass = bodies.masses()[i];
+  if (side.movable) {
+    side.v = scene.course.velocityAt(bodies, i, t, scene.settings.h);
+  }
+  side.s = r * Vector3<S>(bodies.angularVelocities()[i]);
+  side.r = r;
+  side.c = r > S(0) ? S(arm / r) : S(0);
+  side.spin = side.movable && r > S(0) && k > S(0) ? S(S(1) / k) : S(0);
+  return side;
+}
+
+}  // namespace detail
+
+}  // namespace gravel

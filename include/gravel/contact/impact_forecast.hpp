@@ -1,0 +1,319 @@
+#pragma once
+
+/// \file
+/// Which pairs will touch in a step, and when, kept true while blows change the courses of bodies.
+
+#include <gravel/contact/contact.hpp>
+#include <gravel/contact/impact.hpp>
+#include <gravel/core/parallel.hpp>
+
+#include <numeric>
+#include <optional>
+#include <vector>
+
+namespace gravel::detail {
+
+/// The events to come of a step in the order of (time, keys), and what each body has been through.
+template <Real S>
+class ImpactForecast {
+ protected:
+  template <class B, class Course>
+  struct Scene {
+    B& bodies;
+    const Domain<S>& domain;
+    std::span<const Material<S>> materials;
+    std::span<const HalfSpace<S>> walls;
+    std::span<const Contact<S>> held;
+    const ImpactSettings<S>& settings;
+    Course& course;
+
+    /// Mean velocity of the drift and acceleration; none of what nothing moves.
+    Vector3<S> velocity(std::uint32_t i) const {
+      return detail::isMovable(bodies, i) ? Vector3<S>(course.velocity(bodies, i))
+                                          : Vector3<S>(Vector3<S>::Zero());
+    }
+    Vector3<S> acceleration(std::uint32_t i) const {
+      return detail::isMovable(bodies, i) ? Vector3<S>(course.acceleration(bodies, i))
+                                          : Vector3<S>(Vector3<S>::Zero());
+    }
+  };
+
+  using Event = ImpactEvent<S>;
+  using History = ImpactHistory<S>;
+
+  static bool after(const Event& a, const Event& b) { return comesAfter(a, b); }
+
+  static constexpr std::size_t chunk = 2048;
+  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+
+  /// Motion of the second as seen from the first, `drift` of its image included.
+  template <class Scene>
+  static RelativeFlight<S> flightOf(const Scene& scene, std::uint32_t i, std::uint32_t j, Vector3<S>& drift) {
+    Vector3<S> r = Vector3<S>(scene.bodies.positions()[j]) - Vector3<S>(scene.bodies.positions()[i]);
+    drift = Vector3<S>::Zero();
+    scene.domain.minimumImage(r, drift, scene.settings.time);
+    return {r, scene.velocity(j) - scene.velocity(i) + drift, scene.acceleration(j) - scene.acceleration(i),
+            scene.settings.h};
+  }
+
+  template <class Scene>
+  static RelativeFlight<S> flightOf(const Scene& scene, std::uint32_t i, const HalfSpace<S>& wall) {
+    return {Vector3<S>(scene.bodies.positions()[i]) - wall.offset * wall.normal,
+            scene.velocity(i) - wall.velocity, scene.acceleration(i), scene.settings.h};
+  }
+
+  template <class Scene>
+  void predictAll(const Scene& scene, std::span<const Pair> pairs,
+                  const std::optional<std::span<const std::uint32_t>>& nearWalls) {
+    const std::size_t bodiesFrom = (pairs.size() + chunk - 1) / chunk;
+    const std::size_t n = scene.walls.empty() ? 0 : nearWalls ? nearWalls->size() : scene.bodies.size();
+    const std::size_t count = bodiesFrom + (n + chunk - 1) / chunk;
+    parts_.resize(std::max(parts_.size(), count));
+    // No body gets further from where it starts than |v| h + |a| h^2/8.
+    ways_.resize(scene.bodies.size());
+    const S& h = scene.settings.h;
+    parallelFor(ways_.size(), chunk, [&](std::size_t k) {
+      const auto i = static_cast<std::uint32_t>(k);
+      ways_[k] = h * detail::safeNorm(scene.velocity(i)) + h * h * detail::safeNorm(scene.acceleration(i));
+    });
+    parallelForTasks(count, [&](std::size_t c) {
+      parts_[c].clear();
+      if (c < bodiesFrom) {
+        predictPairs(scene, pairs.subspan(c * chunk, std::min(chunk, pairs.size() - c * chunk)), parts_[c]);
+      } else {
+        const std::size_t begin = (c - bodiesFrom) * chunk;
+        for (std::size_t k = begin; k < std::min(begin + chunk, n); ++k) {
+          predictWalls(scene, nearWalls ? (*nearWalls)[k] : static_cast<std::uint32_t>(k), parts_[c]);
+        }
+      }
+    });
+    queue_.clear();
+    for (std::size_t c = 0; c < count; ++c) {
+      queue_.insert(queue_.end(), parts_[c].begin(), parts_[c].end());
+    }
+    std::make_heap(queue_.begin(), queue_.end(), after);
+  }
+
+  template <class Scene>
+  void predictPairs(const Scene& scene, std::span<const Pair> pairs, std::vector<Event>& out) const {
+    const S& h = scene.settings.h;
+    auto next = scene.held.begin();
+    bool placed = false;
+    for (const Pair& pair : pairs) {
+      const std::uint32_t i = pair.first;
+      const std::uint32_t j = pair.second;
+      const S reach = S(scene.bodies.radii()[i]) + S(scene.bodies.radii()[j]);
+      // The common case, before anything else is loaded: not near enough.
+      Vector3<S> drift = Vector3<S>::Zero();
+      Vector3<S> r = Vector3<S>(scene.bodies.positions()[j]) - Vector3<S>(scene.bodies.positions()[i]);
+      scene.domain.minimumImage(r, drift, scene.settings.time);
+      S far = reach + ways_[i] + ways_[j];
+      if (!(drift == Vector3<S>::Zero())) {
+        far += h * detail::safeNorm(drift);
+      }
+      if (r.squaredNorm() > far * far) {
+        continue;
+      }
+      const std::uint64_t key1 = scene.bodies.ids()[i];
+      const std::uint64_t key2 = scene.bodies.ids()[j];
+      if (!placed) {
+        next = lowerBound(scene.held, key1, key2);
+        placed = true;
+      }
+      while (next != scene.held.end() && keysOf(*next) < std::pair(key1, key2)) {
+        ++next;
+      }
+      if ((next != scene.held.end() && keysOf(*next) == std::pair(key1, key2)) ||
+          !detail::canTouch(scene.bodies, i, j)) {
+        continue;
+      }
+      if (const auto t = timeOfImpact<S>(flightOf(scene, i, j, drift), reach, S(0))) {
+        out.push_back({*t, i, j, key1, key2});
+      }
+    }
+  }
+
+  template <class Scene>
+  static void predictWalls(const Scene& scene, std::uint32_t i, std::vector<Event>& out) {
+    const S radius = scene.bodies.radii()[i];
+    if (!(radius > S(0)) || !detail::isMovable(scene.bodies, i)) {
+      return;
+    }
+    for (std::uint32_t w = 0; w < scene.walls.size(); ++w) {
+      const RelativeFlight<S> flight = flightOf(scene, i, scene.walls[w]);
+      if (const auto t = timeOfImpact<S>(flight, scene.walls[w].normal, radius, S(0))) {
+        const std::uint64_t key1 = scene.bodies.ids()[i];
+        const std::uint64_t key2 = boundaryKey(scene.walls[w].number);
+        const auto found = lowerBound(scene.held, key1, key2);
+        if (found == scene.held.end() || keysOf(*found) != std::pair(key1, key2)) {
+          out.push_back({*t, i, staticPartner, key1, key2, 0, 0, w});
+        }
+      }
+    }
+  }
+
+  static std::pair<std::uint64_t, std::uint64_t> keysOf(const Contact<S>& c) { return {c.key1, c.key2}; }
+
+  static auto lowerBound(std::span<const Contact<S>> held, std::uint64_t key1, std::uint64_t key2) {
+    return std::partition_point(held.begin(), held.end(),
+                                [&](const Contact<S>& c) { return keysOf(c) < std::pair(key1, key2); });
+  }
+
+  /// Pairs of each body, as places in the list.
+  void link(std::size_t n, std::span<const Pair> pairs) {
+    start_.assign(n + 1, 0);
+    for (const Pair& pair : pairs) {
+      ++start_[pair.first];
+      ++start_[pair.second];
+    }
+    std::partial_sum(start_.begin(), start_.end(), start_.begin());
+    ofBody_.resize(2 * pairs.size());
+    for (std::size_t k = pairs.size(); k-- > 0;) {
+      ofBody_[--start_[pairs[k].first]] = static_cast<std::uint32_t>(k);
+      ofBody_[--start_[pairs[k].second]] = static_cast<std::uint32_t>(k);
+    }
+  }
+
+  template <class Scene>
+  void predictAgain(const Scene& scene, std::span<const Pair> pairs, std::uint32_t body, const S& from) {
+    if (isDone(scene, body)) {
+      return;
+    }
+    for (std::uint32_t k = start_[body]; k < start_[body + 1]; ++k) {
+      predict(scene, pairs[ofBody_[k]], from);
+    }
+    for (const Pair& pair : late_) {
+      if (pair.first == body || pair.second == body) {
+        predict(scene, pair, from);
+      }
+    }
+    for (std::uint32_t w = 0; w < scene.walls.size(); ++w) {
+      const HalfSpace<S>& wall = scene.walls[w];
+      const S radius = scene.bodies.radii()[body];
+      const RelativeFlight<S> flight = flightOf(scene, body, wall);
+      const std::uint64_t key1 = scene.bodies.ids()[body];
+      const std::uint64_t key2 = boundaryKey(scene.walls[w].number);
+      if (isHeld(scene, body, key1, key2)) {
+        const S gap = wall.normal.dot(flight.place(from)) - radius;
+        if (isDriven(scene, gap, radius, S(-wall.normal.dot(flight.velocity(from))),
+                     detail::safeNorm(flight.a))) {
+          schedule({from, body, staticPartner, key1, key2, 0, 0, w});
+        }
+      } else if (const auto t = timeOfImpact<S>(flight, wall.normal, radius, from)) {
+        schedule({*t, body, staticPartner, key1, key2, 0, 0, w});
+      }
+    }
+  }
+
+  template <class Scene>
+  void predict(const Scene& scene, const Pair& pair, const S& from) {
+    const std::uint32_t i = pair.first;
+    const std::uint32_t j = pair.second;
+    if (isDone(scene, i) || isDone(scene, j) || !detail::canTouch(scene.bodies, i, j)) {
+      return;
+    }
+    Vector3<S> drift;
+    const RelativeFlight<S> flight = flightOf(scene, i, j, drift);
+    const S reach = S(scene.bodies.radii()[i]) + S(scene.bodies.radii()[j]);
+    const std::uint64_t key1 = scene.bodies.ids()[i];
+    const std::uint64_t key2 = scene.bodies.ids()[j];
+    if (isDecided(i, key2)) {
+      return;
+    }
+    if (isHeld(scene, i, key1, key2)) {
+      const Vector3<S> r = flight.place(from);
+      const S distance = detail::safeNorm(r);
+      const Vector3<S> n = detail::safeUnit(r);
+      const S fall = detail::safeNorm(scene.acceleration(i)) + detail::safeNorm(scene.acceleration(j));
+      if (isDriven(scene, S(distance - reach), reach, S(-n.dot(flight.velocity(from))), fall)) {
+        schedule({from, i, j, key1, key2});
+      }
+    } else if (const auto t = timeOfImpact<S>(flight, reach, from)) {
+      schedule({*t, i, j, key1, key2});
+    }
+  }
+
+  void schedule(Event event) {
+    event.stamp1 = history_[event.first].impacts;
+    event.stamp2 = event.second == staticPartner ? 0 : history_[event.second].impacts;
+    queue_.push_back(event);
+    std::push_heap(queue_.begin(), queue_.end(), after);
+  }
+
+  /// Whether somebody else has decided about the pair in this step.
+  bool isDecided(std::uint32_t first, std::uint64_t key2) const {
+    for (std::uint32_t k = history_[first].rests; k != none; k = earlier_[k]) {
+      if (impacts_[k].decided && impacts_[k].key2 == key2) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  /// Solved together with others; or brought to rest in this step.
+  template <class Scene>
+  bool isHeld(const Scene& scene, std::uint32_t first, std::uint64_t key1, std::uint64_t key2) const {
+    for (std::uint32_t k = history_[first].rests; k != none; k = earlier_[k]) {
+      if (impacts_[k].key2 == key2) {
+        return true;
+      }
+    }
+    const auto found = lowerBound(scene.held, key1, key2);
+    return found != scene.held.end() && keysOf(*found) == std::pair(key1, key2);
+  }
+
+  template <class Scene>
+  bool isDone(const Scene& scene, std::uint32_t body) const {
+    return history_[body].spent >= scene.settings.mostPerBody;
+  }
+
+  /// Enters the last impact.
+  template <class Scene>
+  void remember(const Scene& scene, const S& e, ImpactReport<S>& report) {
+    const Impact<S>& impact = impacts_.back();
+    const auto enter = [&](std::uint32_t body, std::uint64_t partner) {
+      History& past = history_[body];
+      const bool before = isDone(scene, body);
+      const S least = S(1) / S(32);
+      past.spent += past.impacts > 0 && past.partner == partner ? least : S(S(1) - e + least);
+      past.partner = partner;
+      if (past.impacts++ == 0) {
+        touched_.push_back(body);
+      }
+      report.postponed += isDone(scene, body) && !before ? 1U : 0U;
+    };
+    enter(impact.first, impact.key2);
+    if (impact.second != staticPartner) {
+      enter(impact.second, impact.key1);
+    }
+    earlier_.push_back(none);
+    if (impact.rests || impact.decided) {
+      earlier_.back() = history_[impact.first].rests;
+      history_[impact.first].rests = static_cast<std::uint32_t>(impacts_.size() - 1);
+    }
+  }
+
+  /// A blow drives a held pair together, faster than what rests picks up in a step.
+  /// \param fall [m s^-2] |a_1| + |a_2|
+  template <class Scene>
+  static bool isDriven(const Scene& scene, const S& gap, const S& reach, const S& u, const S& fall) {
+    return gap <= reach / S(1000) && u > fall * scene.settings.h + scene.settings.restitutionThreshold;
+  }
+
+  std::vector<Event> queue_;
+  std::vector<S> ways_;  ///< [m] bound of the way of each body
+  std::vector<std::vector<Event>> parts_;
+  std::vector<History> history_;
+  std::vector<unsigned char> leans_;    ///< bodies with a contact that is held
+  std::vector<std::uint32_t> touched_;  ///< bodies with a history
+  std::uint64_t linked_ = 0;
+  std::vector<std::uint32_t> start_;
+  std::vector<std::uint32_t> ofBody_;
+  std::vector<Pair> late_;
+  std::vector<Impact<S>> impacts_;
+  std::vector<std::uint32_t> earlier_;  ///< of an impact that rests: the one before of the same first body
+  std::vector<TurnChange<S>> turns_;
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> merges_;
+};
+
+}  // namespace gravel::detail

@@ -1,0 +1,111 @@
+#pragma once
+
+/// \file
+/// Friction, and resistance to rolling and spinning, of one row of a ContactProblem while all others stand.
+
+#include <gravel/contact/contact_problem.hpp>
+
+namespace gravel::detail {
+
+template <Real S>
+struct RowImpulses {
+  using Row = SolverRow<S>;
+  using Body = SolverBody<S>;
+  static constexpr std::uint8_t patience = 8;
+
+  /// What a sweep did: largest change of a velocity, squared; and products, over mass, of the changes of the
+  /// impulses with the whole step since the sweep before, and with themselves.
+  struct Progress {
+    S change_sq = S(0);
+    S along = S(0);
+    S size = S(0);
+    Progress& operator+=(const Progress& other) {
+      change_sq = std::max<S>(change_sq, other.change_sq);
+      along += other.along;
+      size += other.size;
+      return *this;
+    }
+  };
+
+  static void push(Body& b1, Body& b2, const Vector3<S>& j) {
+    if (b1.inverseMass > S(0)) {  // immovable bodies are shared between threads: never written
+      b1.v -= b1.inverseMass * j;
+    }
+    if (b2.inverseMass > S(0)) {
+      b2.v += b2.inverseMass * j;
+    }
+  }
+
+  static void twist(const Row& row, Body& b1, Body& b2, const Vector3<S>& j) {
+    const Vector3<S> turn = row.n.cross(j);
+    if (b1.inverseMass > S(0)) {
+      b1.s -= (row.c1 * b1.spin) * turn;
+    }
+    if (b2.inverseMass > S(0)) {
+      b2.s -= (row.c2 * b2.spin) * turn;
+    }
+  }
+
+  /// Friction of a row for its normal impulse. Sizes are compared as speeds, which are of order one.
+  /// \return the change of the tangential impulse
+  static Vector3<S> rubbed(Row& row, const Vector3<S>& slip, Progress& progress) {
+    using std::sqrt;
+    Vector3<S> jt = row.jt - row.tangentialMass * slip;
+    const S size_sq = Vector3<S>(row.tangentialMobility * jt).squaredNorm();
+    // A contact that keeps changing its mind between sticking and sliding slides: sweeps must end.
+    const S stick =
+        (row.slides < patience ? row.staticFriction : row.kineticFriction) * row.jn * row.tangentialMobility;
+    const bool slides = size_sq > stick * stick;
+    if (slides) {
+      row.slides = static_cast<std::uint8_t>(row.slides + (row.sliding ? 0U : 1U));
+      jt *= row.kineticFriction * row.jn * row.tangentialMobility / S(sqrt(size_sq));
+    }
+    row.sliding = slides;
+    const Vector3<S> dj = jt - row.jt;
+    row.jt = jt;
+    row.stepT += dj;
+    const Vector3<S> change = row.tangentialMobility * dj;
+    progress += {change.squaredNorm(), change.dot(row.stepT), change.dot(dj)};
+    return dj;
+  }
+
+  static Progress rub(ContactProblem<S>& problem, std::size_t k, Body& b1, Body& b2) {
+    Row& row = problem.rows[k];
+    Vector3<S> slip = slipVelocity(row, b1, b2);
+    if (!problem.slipTargets.empty()) {
+      slip -= problem.slipTargets[k];
+    }
+    Progress progress;
+    const Vector3<S> dj = rubbed(row, slip, progress);
+    push(b1, b2, dj);
+    twist(row, b1, b2, dj);
+    return progress;
+  }
+
+  static void turn(const TurningRow<S>& row, Body& b1, Body& b2, const Vector3<S>& l) {
+    if (b1.inverseMass > S(0)) {
+      b1.s -= (row.q1 * b1.spin) * l;
+    }
+    if (b2.inverseMass > S(0)) {
+      b2.s += (row.q2 * b2.spin) * l;
+    }
+  }
+
+  /// Resistance to rolling and spinning of a row for its normal impulse.
+  static Progress resist(ContactProblem<S>& problem, std::size_t k, Body& b1, Body& b2) {
+    TurningRow<S>& row = problem.turning[k];
+    if (!(row.mass > S(0))) {
+      return {};
+    }
+    const Vector3<S> l = resistTurning<S>(Vector3<S>(row.l - row.mass * row.rho(b1, b2)), problem.rows[k].n,
+                                          problem.rows[k].jn, row.rolling, row.spinning);
+    const Vector3<S> dl = l - row.l;
+    row.l = l;
+    row.step += dl;
+    turn(row, b1, b2, dl);
+    const Vector3<S> change = dl / row.mass;
+    return {change.squaredNorm(), change.dot(row.step), change.dot(dl)};
+  }
+};
+
+}  // namespace gravel::detail

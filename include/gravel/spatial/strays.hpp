@@ -1,0 +1,105 @@
+#pragma once
+
+/// \file
+/// Bodies that outrun the skin of a neighbour list: which they are, and the comparison of one with all
+/// others.
+
+#include <gravel/spatial/pair.hpp>
+
+namespace gravel {
+
+/// Bodies that stay where they are for as long as the list is asked to hold.
+struct AtRest {};
+
+namespace detail {
+
+/// [1] Of the scalar, or of double where the scalar does not say.
+template <Real S>
+S roundoff() {
+  using Limits = std::numeric_limits<S>;
+  return Limits::is_specialized ? S(Limits::epsilon()) : S(std::numeric_limits<double>::epsilon());
+}
+
+/// Way [m] of body i; zero for `AtRest`.
+template <Real S, class Travel>
+Vector3<S> wayOf(const Travel& travel, std::size_t i) {
+  if constexpr (std::is_same_v<Travel, AtRest>) {
+    return Vector3<S>::Zero();
+  } else {
+    return travel(i);
+  }
+}
+
+/// Appends the pairs of body i on its way, with others on theirs. O(N).
+/// \param way [m] from positions[i]
+/// \param travel `travel(j)`: way [m] of body j; `AtRest` for none
+/// \param slack [m] added to the sum of the radii
+/// \param free [m] what is left of the skin
+template <Real S, class Positions, class Radii, class Ids, class Travel>
+void compare(std::uint32_t i, const Positions& positions, const Radii& radii, const Ids& ids,
+             const Vector3<S>& way, const Travel& travel, const S& slack, const S& free,
+             const Domain<S>& domain, const S& time, std::vector<Pair>& out) {
+  const Vector3<S> x = positions[i];
+  const S length_sq = way.squaredNorm();
+  const S r_i = radii[i];
+  const std::uint64_t id = idKey(ids[i]);
+  for (std::uint32_t j = 0; j < positions.size(); ++j) {
+    const S radii_ij = r_i + radii[j];
+    if (j == i || !(radii_ij > S(0))) {
+      continue;
+    }
+    using std::sqrt;
+    // Another course may take it anywhere within its half of the skin, which is this far at most.
+    const S far = std::max<S>(S(sqrt(wayOf<S>(travel, j).squaredNorm())), free);
+    const S reach = radii_ij + slack + far;
+    const Vector3<S> r = domain.minimumImage(Vector3<S>(positions[j]) - x, time);
+    // The nearest point of the way: x + way s, 0 <= s <= 1.
+    const S s = length_sq > S(0) ? std::min<S>(S(1), std::max<S>(S(0), S(way.dot(r) / length_sq))) : S(0);
+    if (Vector3<S>(r - s * way).squaredNorm() <= reach * reach * (S(1) + S(16) * roundoff<S>())) {
+      if (id < idKey(ids[j])) {
+        out.push_back({i, j});
+      } else {
+        out.push_back({j, i});
+      }
+    }
+  }
+}
+
+/// Appends to `swift` the bodies that may outrun any skin, at most `most` of the n, fastest first, and leaves
+/// `swift` sorted; none that the skin [m] holds. `ways` and `order` are storage to work in. O(N).
+/// \return [m] twice the way of the next one
+template <Real S, class Travel>
+S takeSwift(std::size_t n, std::size_t most, const S& skin, const Travel& travel, std::vector<S>& ways,
+            std::vector<std::uint32_t>& order, std::vector<std::uint32_t>& swift) {
+  using std::sqrt;
+  ways.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    ways[i] = wayOf<S>(travel, i).squaredNorm();
+    if (!isFinite(ways[i])) {
+      return S(0);  // the search will say which
+    }
+  }
+  if (n == 0) {
+    return S(0);
+  }
+  order.resize(n);
+  std::iota(order.begin(), order.end(), 0U);
+  most = std::min(most, n - 1);
+  const auto faster = [&](std::uint32_t a, std::uint32_t b) {
+    return ways[a] > ways[b] || (ways[a] == ways[b] && a < b);
+  };
+  std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(most), order.end(), faster);
+  const S enough = S(2) * S(sqrt(ways[order[most]]));
+  const S thick = std::max<S>(skin, enough);
+  for (std::size_t k = 0; k < most; ++k) {
+    if (S(4) * ways[order[k]] > thick * thick) {
+      swift.push_back(order[k]);
+    }
+  }
+  std::sort(swift.begin(), swift.end());
+  return enough;
+}
+
+}  // namespace detail
+
+}  // namespace gravel
