@@ -22,8 +22,8 @@ inline double ringSide(const RingOptions& options) {
   return std::sqrt(static_cast<double>(options.count) * pi<double>() / options.opticalDepth);
 }
 
-/// The patch with its bodies on a jittered lattice, moving with the flow and 1 rms besides along each axis. On
-/// the mean they have no height, and no velocity but the flow's.
+/// The patch with its bodies on a jittered lattice, moving with the flow and 1 rms besides along each axis.
+/// On the mean they have no height, and no velocity but the flow's.
 inline Space<double> ringPatch(const RingOptions& options) {
   SimulationConfig<double> config;
   config.G = 0.0;

@@ -220,8 +220,8 @@ TEST_CASE("A step far too long is taken again, and a far too short one grows, at
 }
 
 // The energy walks by rounding, as the root of the number of steps: rms 3e-15 in these 5000 orbits, 1e-15 in
-// these 1000 of Jupiter (3e-15 in 1e4). Seen to fail: what the weights lose to rounding added where it vanishes
-// (a drift of 3e-15 in 480 orbits).
+// these 1000 of Jupiter (3e-15 in 1e4). Seen to fail: what the weights lose to rounding added where it
+// vanishes (a drift of 3e-15 in 480 orbits).
 TEST_CASE("Thousands of orbits keep the energy to a few tens of units of rounding") {
   Bodies<double> pair;
   for (const Body<double>& body : scenes::keplerPair<double>(0.0, 1e-3)) {

@@ -1,5 +1,5 @@
-#include "support/space.hpp"
 #include "support/catch.hpp"
+#include "support/space.hpp"
 #include <gravel/space/space.hpp>
 
 #include <limits>

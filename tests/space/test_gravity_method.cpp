@@ -1,5 +1,5 @@
-#include "support/space.hpp"
 #include "support/catch.hpp"
+#include "support/space.hpp"
 #include "support/temporary_file.hpp"
 #include <gravel/gravel.hpp>
 

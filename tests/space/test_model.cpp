@@ -1,7 +1,7 @@
 // A program written against the reference's class page, with its names and nothing else of gravel's.
 
-#include "support/space.hpp"
 #include "support/catch.hpp"
+#include "support/space.hpp"
 #include <gravel/model.hpp>
 
 #include <optional>

@@ -1,6 +1,6 @@
-#include "support/space.hpp"
 #include "space/quiet_spaces.hpp"
 #include "support/catch.hpp"
+#include "support/space.hpp"
 #include <gravel/space/space.hpp>
 
 #include <limits>

@@ -30,7 +30,7 @@ inline constexpr std::size_t phaseCount = 11;
 
 constexpr const char* phaseName(Phase phase) {
   constexpr std::array<const char*, phaseCount> names{
-      "integration",     "neighbour search", "narrow phase", "impacts", "colouring", "contact solve",
+      "integration",     "neighbour search", "narrow phase", "impacts",   "colouring",  "contact solve",
       "pos. correction", "gravity",          "damping",      "time step", "diagnostics"};
   return names[static_cast<std::size_t>(phase)];
 }
