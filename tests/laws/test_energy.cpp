@@ -159,9 +159,9 @@ TEST_CASE("With gravity, friction and blows the ledger closes to the second orde
   std::vector<double> errors;
   for (const double dt : {4e-3, 2e-3, 1e-3, 5e-4}) {
     double sum = 0;  // over where in a step the blow falls
-    for (int k = 0; k < 16; ++k) {
-      shift = 0.0013 * k;
-      sum += ledgerError(dt, 2.5, meeting).first / 16;
+    for (int k = 0; k < 64; ++k) {
+      shift = 0.00037 * k;
+      sum += ledgerError(dt, 2.5, meeting).first / 64;
     }
     errors.push_back(sum);
   }
