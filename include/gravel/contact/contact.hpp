@@ -24,7 +24,10 @@ struct ContactKeys {
   std::uint64_t first;
   std::uint64_t second;
 
-  friend auto operator<=>(const ContactKeys&, const ContactKeys&) = default;
+  friend bool operator==(const ContactKeys&, const ContactKeys&) = default;
+  friend bool operator<(const ContactKeys& a, const ContactKeys& b) {
+    return a.first != b.first ? a.first < b.first : a.second < b.second;
+  }
 };
 
 /// Two bodies, or a body and a boundary, that touch. Named by ids, so that it is recognised in the next step

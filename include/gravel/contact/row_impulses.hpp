@@ -61,7 +61,7 @@ struct RowImpulses {
       jt *= row.kineticFriction * row.jn * row.tangentialMobility / S(sqrt(size_sq));
     }
     row.sliding = slides;
-    const Vector3<S> dj = jt - row.jt;
+    Vector3<S> dj = jt - row.jt;
     row.jt = jt;
     row.stepT += dj;
     const Vector3<S> change = row.tangentialMobility * dj;

@@ -61,7 +61,7 @@ struct RadauWeights {
     velocityLow = low(t.velocity[nodes]);
     for (std::size_t n = 0; n < nodes; ++n) {
       coefficient[n] = high(t.power[n]);
-      const Scalar s = Scalar(t.node[n]);
+      const Scalar s = Scalar(std::remove_cvref_t<decltype(t)>::node[n]);
       Scalar p = s;
       for (std::size_t j = 0; j < nodes; ++j, p *= s) {
         power[n][j] = p;

@@ -68,8 +68,9 @@ void keplerIncrements(const Vector3<Scalar>& x, const Vector3<Scalar>& v, const 
     while (turns < h || turns < -h) {
       turns *= Scalar(2);
     }
-    for (; turns >= period; turns /= Scalar(2)) {
+    while (turns >= period) {
       h += h > turns ? Scalar(-turns) : h < -turns ? turns : Scalar(0);
+      turns /= Scalar(2);
     }
     low = h > Scalar(0) ? Scalar(0) : Scalar(-turn);
     high = low + turn;

@@ -136,6 +136,7 @@ class MultipoleWalk {
     }
     ++count_.tests;
     const std::uint64_t pairs = std::uint64_t(sink.count()) * source.count();
+    // NOLINTNEXTLINE(bugprone-branch-clone): the order counts, the cheap test before the dear one
     if (pairs <= limits_.pairsBelowExpansion) {
       near_.addSources(tree_, source.first, source.last);
     } else if (c < s ? isFar(sink, source) : isFar(source, sink)) {
