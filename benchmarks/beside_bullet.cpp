@@ -281,6 +281,7 @@ void compare(const char* name, const Scene& scene, std::size_t settle, std::size
   line("Bullet", median(b), theirs.errors(), theirs.kinetic());
   std::printf("Bullet / gravel: %.2f\n", median(ratio));
   ours.report();
+  std::fflush(stdout);
 }
 
 }  // namespace
