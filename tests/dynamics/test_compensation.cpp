@@ -106,8 +106,7 @@ TEST_CASE("A compensated sum is exact but for the rounding of its terms, whateve
 
 // Brouwer (1937): what rounds without bias makes an energy error that grows as the square root of the number
 // of steps. 2 x 192 samples; the walk over 16 samples (2048 steps) has 24 independent windows, 15 % of its
-// rms, which is 0.05 in the exponent. Seen to fail: the last kick of every step a part in 1e15 too long
-// (exponent 0.9).
+// rms, which is 0.05 in the exponent.
 TEST_CASE("Rounding of the outer solar system grows by Brouwer's law, and is a twentieth with compensation") {
   const std::array<double, 3> plain = energyWalk(false);
   const std::array<double, 3> carried = energyWalk(true);

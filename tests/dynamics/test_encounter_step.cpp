@@ -113,7 +113,6 @@ TEST_CASE("A fast pass that gravity hardly bends is not resolved, a slow one is"
   CHECK_THAT(stepAt(100.0), WithinRel(0.02 * std::pow(2.0, 0.125) / 10.0, 1e-6));
 }
 
-// Seen to fail: the approach without its gap, which a distant fast pair would shorten every step for.
 TEST_CASE("No pair meets deeper than a quarter of the smaller radius, and a distant one is let come") {
   Body<double> one;
   Body<double> two;

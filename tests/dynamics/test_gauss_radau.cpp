@@ -68,7 +68,6 @@ Real80 energyOf(const Bodies<double>& bodies, Real80 G) {
 
 // Collocation at Radau's nodes: the weights of the whole step integrate s^k for k = 1 … 14, seven more than
 // seven nodes and the start must, and not s^15 (whose error is the constant of the method, 1.9e-8).
-// Seen to fail: one node changed in the tenth digit.
 TEST_CASE("Radau's weights integrate powers up to 14 and not beyond, and those of the nodes up to 7") {
   const detail::RadauTables& t = detail::radauTables;
   const auto integral = [&](const detail::RadauTables::Row& w, int k) {

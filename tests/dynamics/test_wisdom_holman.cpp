@@ -79,7 +79,7 @@ TEST_CASE("A single planet of any mass is exact, however long the step") {
   }
 }
 
-// Two-sided in both: h^2, and the planets' masses. Seen to fail: the orbit's acceleration left in the kick.
+// Two-sided in both: h^2, and the planets' masses.
 TEST_CASE("The error is of second order in the step and of first in the planets' masses") {
   const long double coarse = worst(1.0L, 200.0L);
   const long double fine = worst(1.0L, 100.0L);
