@@ -67,6 +67,7 @@ TEST_CASE("A dropped ball rests after its bounces: no speed, no sinking, no jitt
   }
 }
 
+// Seen to fail: a blow that changes the velocity alone, not the place from which the drift begins.
 TEST_CASE("In a uniform field every bounce is at its exact time and height, whatever the step") {
   for (const double e : {0.3, 0.5, 0.9}) {
     for (const double dt : {2e-2, 4e-3, 5e-4}) {
