@@ -76,10 +76,10 @@ ContactVirial<Scalar> contactVirial(const Bodies<Scalar, Layout>& bodies,
   }
   const Vector3<Scalar> centre = of.template segment<3>(1).matrix() / of[0];
   const Vector3<Scalar> drift = of.template segment<3>(4).matrix() / of[0];
-  using Pair = Eigen::Array<Scalar, 2, 1>;
-  const Pair terms =
-      orderedSum(bodies.size(), 1024, Pair(Pair::Zero()), [&](std::size_t begin, std::size_t end) {
-        Pair part = Pair::Zero();
+  using TwoSums = Eigen::Array<Scalar, 2, 1>;
+  const TwoSums terms =
+      orderedSum(bodies.size(), 1024, TwoSums(TwoSums::Zero()), [&](std::size_t begin, std::size_t end) {
+        TwoSums part = TwoSums::Zero();
         for (std::size_t i = begin; i < end; ++i) {
           const auto body = bodies[i];
           if (!body.isFixed()) {
