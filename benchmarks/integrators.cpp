@@ -66,11 +66,9 @@ void run(const Problem& problem, IntegratorKind kind, double step, double factor
     }
     size += x.squaredNorm();
   }
+  const bool ownSteps = traitsOf(kind).forceEvaluations == 0;
   std::printf("%s,%s%s,%.6g,%.6g,%llu,%.4g,%.4g\n", problem.name, traitsOf(kind).name,
-              step > 0.0                             ? ""
-              : kind == IntegratorKind::GaussRadau15 ? ""
-                                                     : " adaptive",
-              step > 0.0 ? step : factor, seconds,
+              step > 0.0 || ownSteps ? "" : " adaptive", step > 0.0 ? step : factor, seconds,
               static_cast<unsigned long long>(space.profiler().entry(Phase::Gravity).calls), energy,
               std::sqrt(place / size));
   std::fflush(stdout);
@@ -99,6 +97,9 @@ void sweep(Problem problem) {
     }
   }
   if (points) {
+    for (const double factor : {0.08, 0.02, 0.005, 1.25e-3, 3.1e-4, 7.8e-5, 2e-5}) {
+      run(problem, IntegratorKind::Hermite4, 0.0, factor);
+    }
     for (const IntegratorKind kind :
          {IntegratorKind::VelocityVerlet, IntegratorKind::BlanesMoan4, IntegratorKind::BlanesMoan6}) {
       const int calls = traitsOf(kind).forceEvaluations;

@@ -23,6 +23,7 @@ COLOURS = {
     "VelocityVerlet": "black", "Yoshida4": "tab:blue", "Yoshida6": "tab:orange", "Yoshida8": "tab:olive",
     "BlanesMoan4": "tab:green", "BlanesMoan6": "tab:red", "KahanLi6": "tab:pink", "KahanLi8": "tab:purple",
     "ForceGradient4": "tab:brown", "WisdomHolman": "tab:cyan", "GaussRadau15": "magenta",
+    "Hermite4": "tab:gray",
 }
 
 

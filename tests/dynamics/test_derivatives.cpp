@@ -3,8 +3,10 @@
 #include "support/catch.hpp"
 #include <gravel/dynamics/encounter_step.hpp>
 #include <gravel/dynamics/gauss_radau.hpp>
+#include <gravel/dynamics/hermite.hpp>
 #include <gravel/dynamics/wisdom_holman.hpp>
 #include <gravel/gravity/direct_sum.hpp>
+#include <gravel/gravity/jerk_sum.hpp>
 
 #include <unsupported/Eigen/AutoDiff>
 
@@ -47,6 +49,13 @@ std::vector<S> endOf(IntegratorKind kind, bool adaptive, const std::array<S, 2>&
     WisdomHolman<S> method;
     for (int i = 0; i < 20; ++i) {
       method.advance(bodies, G, S(0.1), forces);
+    }
+  } else if (kind == IntegratorKind::Hermite4) {
+    Hermite4<S> method;
+    JerkSum<S> jerks;
+    jerks.setLaw(G, S(0));
+    for (int i = 0; i < 4; ++i) {
+      method.advance(bodies, S(0.5), Vector3<S>(S(0), S(0), S(0)), jerks, [&] { forces(S(0)); });
     }
   } else {
     S h(0.01);
@@ -108,6 +117,11 @@ TEST_CASE("Derivatives through every row of kicks and drifts are those of finite
 
 TEST_CASE("Derivatives through adaptive steps hold the change of the steps as well") {
   compare(IntegratorKind::VelocityVerlet, true);
+}
+
+// Steps are powers of two of the time asked for, so that small changes of the start change none.
+TEST_CASE("Derivatives through Hermite's block steps are those of finite differences") {
+  compare(IntegratorKind::Hermite4, false);
 }
 
 TEST_CASE("Derivatives through Gauss-Radau and Wisdom-Holman are those of finite differences") {

@@ -9,7 +9,8 @@ using namespace gravel::test;
 namespace {
 
 /// Methods that move points only.
-constexpr IntegratorKind orbital[] = {IntegratorKind::GaussRadau15, IntegratorKind::WisdomHolman};
+constexpr IntegratorKind orbital[] = {IntegratorKind::GaussRadau15, IntegratorKind::WisdomHolman,
+                                      IntegratorKind::Hermite4};
 
 template <class S = double, class Layout = SoA>
 Space<S, Layout> planets(IntegratorKind kind, bool adaptive) {
@@ -79,8 +80,12 @@ TEST_CASE("Steps end where they are asked to, whatever the method takes inside")
       const double start = energyOf(space);
       space.advanceTo(20001.0);
       CHECK(space.time() == 20001.0);
-      // Wisdom-Holman in steps of an eleventh of Jupiter's orbit; the other is right to rounding.
-      CHECK_THAT(energyOf(space), WithinRel(start, kind == IntegratorKind::GaussRadau15 ? 1e-14 : 1e-5));
+      // Wisdom-Holman in steps of an eleventh of Jupiter's orbit, Hermite's method in 44 steps an orbit; the
+      // third is right to rounding.
+      const double error = kind == IntegratorKind::GaussRadau15 ? 1e-14
+                           : kind == IntegratorKind::Hermite4   ? 1e-4
+                                                                : 1e-5;
+      CHECK_THAT(energyOf(space), WithinRel(start, error));
       Space<double> other = planets(kind, adaptive);
       for (int i = 1; i <= 3; ++i) {
         other.advanceTo(6667.0 * i);
@@ -90,6 +95,68 @@ TEST_CASE("Steps end where they are asked to, whatever the method takes inside")
             (kind == IntegratorKind::GaussRadau15 ? 1e-13 : 1e-3));
       CHECK(space.energyLedger().dissipated() == 0.0);
     }
+  }
+}
+
+TEST_CASE("Hermite's steps follow timeStepFactor, and a user's own force is refused with it") {
+  double errors[2];
+  for (const double factor : {0.02, 0.02 / 16}) {
+    SimulationConfig<double> config;
+    config.G = 1;
+    config.integrator = IntegratorKind::Hermite4;
+    config.timeStep = 0.25;
+    config.timeStepFactor = factor;
+    Space<double> space(config);
+    for (const Body<double>& body : scenes::keplerPair<double>(0.5, 0.3)) {
+      space.addBody(body);
+    }
+    const double start = energyOf(space);
+    space.advanceTo(20.0);
+    CHECK(space.getTimeStep() == 0.25);
+    errors[factor < 0.01 ? 1 : 0] = std::abs(energyOf(space) / start - 1);
+    CHECK_THAT(space.energyLedger().total(), WithinAbs(energyOf(space), 1e-15));
+
+    const auto before = stateOf(space);
+    space.setForceHook([](Bodies<double>&, double) {});
+    CHECK_THROWS_WITH(space.computeDynamics(0),
+                      ContainsSubstring("own force") && ContainsSubstring("Hermite4"));
+    CHECK(sameBits(stateOf(space), before));
+    space.setForceHook({});
+    space.computeDynamics(0);
+  }
+  // With the square of the factor: 256.
+  CAPTURE(errors[0], errors[1]);
+  CHECK(errors[0] < 1e-3);
+  CHECK(errors[0] / errors[1] > 64);
+  CHECK(errors[0] / errors[1] < 1024);
+}
+
+TEST_CASE("A change of G, of the field or of a body between two steps is felt by Hermite's method") {
+  const auto make = [](double G) {
+    SimulationConfig<double> config;
+    config.G = G;
+    config.integrator = IntegratorKind::Hermite4;
+    config.timeStep = 0.1;
+    Space<double> space(config);
+    for (const Body<double>& body : scenes::keplerPair<double>(0.5, 0.3)) {
+      space.addBody(body);
+    }
+    return space;
+  };
+  Space<double> changed = make(1.0);
+  advance(changed, 3);
+  changed.setG(2.0);
+  changed.setUniformField({0, 0, -1});
+  Space<double> fresh = make(2.0);
+  fresh.setUniformField({0, 0, -1});
+  for (std::size_t i = 0; i < 2; ++i) {
+    fresh.body(i).position() = Vec(changed.body(i).position());
+    fresh.body(i).velocity() = Vec(changed.body(i).velocity());
+  }
+  advance(changed, 2);
+  advance(fresh, 2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    CHECK(Vec(changed.body(i).position()) == Vec(fresh.body(i).position()));
   }
 }
 
@@ -112,8 +179,8 @@ TEMPLATE_TEST_CASE("Orbits saved and taken up go on bit for bit", "", (std::pair
   using S = typename TestType::first_type;
   using Layout = typename TestType::second_type;
   const TemporaryFile file("orbits");
-  for (const IntegratorKind kind :
-       {IntegratorKind::GaussRadau15, IntegratorKind::WisdomHolman, IntegratorKind::KahanLi8}) {
+  for (const IntegratorKind kind : {IntegratorKind::GaussRadau15, IntegratorKind::WisdomHolman,
+                                    IntegratorKind::Hermite4, IntegratorKind::KahanLi8}) {
     for (const bool adaptive : {false, true}) {
       auto whole = planets<S, Layout>(kind, adaptive);
       advance(whole, 60);

@@ -37,6 +37,8 @@ enum class IntegratorKind : std::uint8_t {
   /// order 2 in Jacobi's coordinates, 1 evaluation; planets about a heavy centre, points
   /// (dynamics/wisdom_holman.hpp)
   WisdomHolman,
+  /// order 4, a step of its own choice for each body (dynamics/hermite.hpp); bodies must be points
+  Hermite4,
 };
 
 /// One kick, one drift and the force evaluation after it.
@@ -182,6 +184,8 @@ inline constexpr IntegratorTraits traitsOf(IntegratorKind kind) {
       return {"GaussRadau15", 15, 0, false, false, false, {}, 0};
     case IntegratorKind::WisdomHolman:
       return {"WisdomHolman", 2, 1, true, true, false, {}, 0};
+    case IntegratorKind::Hermite4:
+      return {"Hermite4", 4, 0, false, false, false, {}, 0};
     case IntegratorKind::SymplecticEpicycle:
       return row("SymplecticEpicycle", 2, detail::verletStages);
     case IntegratorKind::VelocityVerlet:

@@ -69,6 +69,8 @@ class GravityUnits {
   };
 
   Factor acceleration(const S& G) const { return Factor(G, massExponent_ - 2 * lengthExponent_); }
+  /// Also of G m / r^3, in s^-2.
+  Factor jerk(const S& G) const { return Factor(G, massExponent_ - 3 * lengthExponent_); }
   Factor energy(const S& G) const { return Factor(G, 2 * massExponent_ - lengthExponent_); }
 
  private:

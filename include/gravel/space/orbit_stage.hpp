@@ -5,7 +5,9 @@
 /// They move points under forces; where bodies may touch they are refused.
 
 #include <gravel/dynamics/gauss_radau.hpp>
+#include <gravel/dynamics/hermite.hpp>
 #include <gravel/dynamics/wisdom_holman.hpp>
+#include <gravel/gravity/jerk_sum.hpp>
 #include <gravel/output/snapshot.hpp>
 #include <gravel/space/contact_stage.hpp>
 #include <gravel/space/force_stage.hpp>
@@ -21,8 +23,10 @@ class OrbitStage {
   /// \return true if this stage moves the bodies with such an integrator
   static bool moves(IntegratorKind kind) { return traitsOf(kind).stages.empty(); }
 
-  /// \throws std::invalid_argument if bodies may touch something, or the domain has images
-  static void check(IntegratorKind kind, const Bodies& bodies, const ContactStage<Scalar, Layout>& contact) {
+  /// \throws std::invalid_argument if bodies may touch something, or the domain has images, or a force's rate
+  ///   of change is needed and not known
+  static void check(IntegratorKind kind, const Bodies& bodies, const ContactStage<Scalar, Layout>& contact,
+                    const ForceStage<Scalar, Layout>& force) {
     if (!moves(kind)) {
       return;
     }
@@ -32,6 +36,10 @@ class OrbitStage {
     }
     if (!contact.boundaries.empty()) {
       detail::refuse("number of boundaries with the " + who, "not 0", "0: it moves points, without contacts");
+    }
+    if (kind == IntegratorKind::Hermite4 && force.hook) {
+      detail::refuse("user's own force with the " + who, "set",
+                     "none: the method needs how forces change with time, which is known of gravity alone");
     }
     for (std::size_t i = 0; bodies.size() > 1 && i < bodies.size(); ++i) {
       if (Scalar(bodies.radii()[i]) > Scalar(0)) {
@@ -52,6 +60,11 @@ class OrbitStage {
     spin(bodies, half, h, force.hasTorques());
     if (config.integrator == IntegratorKind::WisdomHolman) {
       wisdomHolman_.advance(bodies, config.G, h, forces);
+    } else if (config.integrator == IntegratorKind::Hermite4) {
+      hermite_.setStepFactor(config.timeStepFactor);
+      hermite_.setShortestStep(config.minTimeStep);
+      jerks_.setLaw(config.G, config.softening);
+      hermite_.advance(bodies, h, force.field, jerks_, [&] { forces(h); });
     } else {
       gaussRadau_.advance(bodies, h, static_cast<bool>(force.hook), forces);
     }
@@ -59,9 +72,9 @@ class OrbitStage {
   }
 
   /// The step that the method asks for [s], within the limits of the configuration: Wisdom-Holman's is the
-  /// longest always, since it is symplectic for a fixed step.
+  /// longest always, since it is symplectic for a fixed step, and Hermite's, which takes shorter ones inside.
   Scalar nextStep(const Bodies& bodies, const SimulationConfig<Scalar>& config) const {
-    if (config.integrator == IntegratorKind::WisdomHolman) {
+    if (config.integrator != IntegratorKind::GaussRadau15) {
       return config.timeStep;
     }
     const Scalar wanted = gaussRadau_.nextStep() > Scalar(0)
@@ -75,6 +88,8 @@ class OrbitStage {
     out.array("Gauss-Radau", state.data(), state.size());
     const std::vector<Scalar> lost = wisdomHolman_.lost().lostParts(bodies);
     out.array("Wisdom-Holman", lost.data(), lost.size());
+    const std::vector<Scalar> hermite = hermite_.state();
+    out.array("Hermite", hermite.data(), hermite.size());
   }
 
   /// Of the bodies of the same file. \throws std::runtime_error if the file does not hold what save() writes
@@ -83,6 +98,9 @@ class OrbitStage {
       in.fail("holds a Gauss-Radau state of a wrong length");
     }
     wisdomHolman_.lost().setLostParts(bodies, in.array<Scalar>("Wisdom-Holman"));
+    if (!hermite_.setState(bodies, in.array<Scalar>("Hermite"))) {
+      in.fail("holds a Hermite state of a wrong length");
+    }
   }
 
  private:
@@ -105,6 +123,8 @@ class OrbitStage {
 
   GaussRadau15<Scalar> gaussRadau_;
   WisdomHolman<Scalar> wisdomHolman_;
+  Hermite4<Scalar> hermite_;
+  JerkSum<Scalar> jerks_;
 };
 
 }  // namespace gravel

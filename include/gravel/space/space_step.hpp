@@ -135,7 +135,7 @@ template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::prepare() {
   bodies_.validateAll();
   contact_.materials.check(bodies_);
-  orbits_.check(this->config_.integrator, bodies_, contact_);
+  orbits_.check(this->config_.integrator, bodies_, contact_, force_);
   if (!forcesValid_ || placesChanged()) {
     applyGravity();
     buildCollisionGraph();
