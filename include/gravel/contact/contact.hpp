@@ -87,6 +87,18 @@ Vector3<Scalar> directionOfIds(std::uint64_t id1, std::uint64_t id2) {
 
 }  // namespace detail
 
+/// Two spheres with the separation r_12 = x2 - x1 of length `distance` and the sum of radii `reach` > 0.
+template <Real Scalar>
+Touch<Scalar> touchAt(const Vector3<Scalar>& r_12, const Scalar& distance, const Scalar& r1,
+                      const Scalar& reach, std::uint64_t id1, std::uint64_t id2, const Scalar& epsilon) {
+  const Scalar near = std::min(epsilon, Scalar(Scalar(16) * Eigen::NumTraits<Scalar>::epsilon() * reach));
+  const bool coincident = !(distance > Scalar(0)) || distance <= near;
+  const Scalar arm1 = distance * (r1 / reach);
+  return Touch<Scalar>{
+      coincident ? detail::directionOfIds<Scalar>(id1, id2) : detail::safeUnit(r_12, distance), distance,
+      distance - reach, arm1, distance - arm1};
+}
+
 /// Two spheres with the separation r_12 = x2 - x1; nothing unless |r_12| < r1 + r2 + margin. The arms share
 /// the distance in proportion of the radii: arm1 + arm2 = |r_12| keeps the angular momentum of a blow to
 /// rounding. Where the centres fall together (at most epsilon apart, and no more than the rounding of the
@@ -100,11 +112,7 @@ std::optional<Touch<Scalar>> sphereSphere(const Vector3<Scalar>& r_12, const Sca
   if (!(reach > Scalar(0)) || !(distance < reach + margin)) {
     return std::nullopt;
   }
-  const Scalar near = std::min(epsilon, Scalar(Scalar(16) * Eigen::NumTraits<Scalar>::epsilon() * reach));
-  const bool coincident = !(distance > Scalar(0)) || distance <= near;
-  const Scalar arm1 = distance * (r1 / reach);
-  return Touch<Scalar>{coincident ? detail::directionOfIds<Scalar>(id1, id2) : detail::safeUnit(r_12),
-                       distance, distance - reach, arm1, distance - arm1};
+  return touchAt(r_12, distance, r1, reach, id1, id2, epsilon);
 }
 
 /// A sphere and a half-space; nothing unless the gap is below margin. The arm is the radius. A centre deep

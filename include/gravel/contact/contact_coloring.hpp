@@ -6,6 +6,7 @@
 #include <gravel/contact/contact.hpp>
 #include <gravel/contact/contact_bodies.hpp>
 #include <gravel/core/check.hpp>
+#include <gravel/core/parallel.hpp>
 
 #include <bit>
 #include <span>
@@ -154,5 +155,42 @@ class ContactColoring {
   std::vector<std::uint8_t> colour_;
   std::vector<std::uint64_t> used_;
 };
+
+namespace detail {
+
+/// Sum of f(k) over rows [begin, end) that share no movable body, shared between threads where they are many;
+/// chunks depend on their number alone.
+template <class T, class F>
+T sumOverRows(std::size_t begin, std::size_t end, const T& zero, F&& f) {
+  constexpr std::size_t chunk = 512;
+  const auto run = [&](std::size_t from, std::size_t to) {
+    T sum = zero;
+    for (std::size_t k = from; k < to; ++k) {
+      sum += f(k);
+    }
+    return sum;
+  };
+  if (end - begin < 4 * chunk) {  // not worth the threads
+    return run(begin, end);
+  }
+  return orderedSum(end - begin, chunk, zero,
+                    [&](std::size_t from, std::size_t to) { return run(begin + from, begin + to); });
+}
+
+/// The same over all rows but the lone ones, colour after colour, and the overflow one by one.
+template <class T, class F>
+T sumOverColours(const ContactColoring& colouring, const T& zero, F&& f) {
+  T sum = zero;
+  for (std::size_t c = 0; c < colouring.colours(); ++c) {
+    sum += sumOverRows(colouring.begin(c), colouring.end(c), zero, f);
+  }
+  const std::size_t overflow = colouring.colours();
+  for (std::size_t k = colouring.begin(overflow); k < colouring.end(overflow); ++k) {
+    sum += f(k);
+  }
+  return sum;
+}
+
+}  // namespace detail
 
 }  // namespace gravel

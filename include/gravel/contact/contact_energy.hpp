@@ -23,12 +23,15 @@ namespace gravel {
 template <Real S>
 class ContactEnergy {
  public:
-  /// Guards the energy of `problem` and fills in the losses of the report. O(contacts).
+  /// Guards the energy of `problem`, fills in the losses of the report, and takes down the impulses in the
+  /// order of contacts. O(contacts).
   void settle(ContactProblem<S>& problem, const ContactColoring& colouring,
-              std::span<const Contact<S>> contacts, ContactReport<S>& report) {
-    Sums sums = losses(problem, contacts);
+              std::span<const Contact<S>> contacts, ContactReport<S>& report,
+              std::span<ContactImpulse<S>> impulses) {
+    terms_.resize(problem.rows.size());
+    Sums sums = takeDown(problem, contacts, impulses);
     if (sums[3] > S(0) && guard(problem, colouring, contacts)) {
-      sums = losses(problem, contacts);
+      sums = takeDown(problem, contacts, impulses);
     }
     report.restitutionLoss = problem.energyOut(sums[0]);
     report.frictionLoss = problem.energyOut(sums[1]);
@@ -42,26 +45,41 @@ class ContactEnergy {
   using Sums = Eigen::Array<S, 4, 1>;
   static constexpr std::size_t chunk = 2048;
 
-  struct Rates {
-    S normal;      ///< J_n v_n
-    S tangential;  ///< J_t.v_t
+  struct Island {
+    S gain = S(0);    ///< of energy
+    S size = S(0);    ///< of the terms that add up to it
+    S before = S(0);  ///< sum of J.u^-, of those that gain
+    S beta = S(1);
+    bool gains = false;
   };
 
-  static Rates power(const ContactProblem<S>& problem, const Row& row, const std::vector<Body>& bodies,
-                     const Vector3<S>& drift) {
-    const Body& b1 = bodies[row.slot1];
-    const Body& b2 = bodies[row.slot2];
-    const S v_n = detail::normalVelocity(row, b1, b2) + row.n.dot(drift);
+  /// J_n v_n, and J_t.v_t with what turns, at the velocities `b1` and `b2`.
+  static std::array<S, 2> power(const ContactProblem<S>& problem, std::size_t k, const Body& b1,
+                                const Body& b2, const Vector3<S>& drift) {
+    const Row& row = problem.rows[k];
+    Vector3<S> v_rel = b2.v - b1.v;
+    if (problem.drifting) {
+      v_rel += drift;
+    }
     S across(0);
-    if (row.staticFriction > S(0)) {
-      across = row.jt.dot(Vector3<S>(detail::slipVelocity(row, b1, b2) + drift));
+    if (row.stick > S(0)) {
+      // u has no part along n.
+      across = row.tangentialMass *
+               row.u.dot(Vector3<S>(v_rel - Vector3<S>(row.c1 * b1.s + row.c2 * b2.s).cross(row.n)));
     }
     if (!problem.turning.empty()) {
-      const detail::TurningRow<S>& turning =
-          problem.turning[static_cast<std::size_t>(&row - problem.rows.data())];
-      across += turning.l.dot(turning.rho(b1, b2));
+      across += problem.turning[k].l.dot(problem.turning[k].rho(b1, b2));
     }
-    return {row.jn * v_n, across};
+    return {row.jn * row.n.dot(v_rel), across};
+  }
+
+  /// The mean of a body's velocities before and after.
+  static Body meanOf(const ContactProblem<S>& problem, std::uint32_t slot) {
+    const Body& before = problem.initial[slot];
+    Body mean = problem.bodies[slot];
+    mean.v = (before.v + mean.v) / S(2);
+    mean.s = (before.s + mean.s) / S(2);
+    return mean;
   }
 
   static Vector3<S> driftOf(const ContactProblem<S>& problem, std::span<const Contact<S>> contacts,
@@ -69,27 +87,37 @@ class ContactEnergy {
     return problem.drifting ? problem.speedIn(contacts[row.contact].drift) : Vector3<S>(Vector3<S>::Zero());
   }
 
-  Sums losses(const ContactProblem<S>& problem, std::span<const Contact<S>> contacts) const {
-    return orderedSum(problem.rows.size(), chunk, Sums(Sums::Zero()),
-                      [&](std::size_t begin, std::size_t end) {
-                        Sums sums = Sums::Zero();
-                        for (std::size_t k = begin; k < end; ++k) {
-                          const Row& row = problem.rows[k];
-                          if (!(row.jn > S(0))) {
-                            continue;
-                          }
-                          const Vector3<S> drift = driftOf(problem, contacts, row);
-                          const Rates before = power(problem, row, problem.initial, drift);
-                          const Rates after = power(problem, row, problem.bodies, drift);
-                          const S normal = (before.normal + after.normal) / S(2);
-                          const S tangential = (before.tangential + after.tangential) / S(2);
-                          sums[0] -= normal;
-                          sums[1] -= tangential;
-                          sums[2] -= Vector3<S>(row.jn * row.n + row.jt).dot(drift);
-                          sums[3] += std::max<S>(S(0), normal + tangential);
-                        }
-                        return sums;
-                      });
+  Sums takeDown(const ContactProblem<S>& problem, std::span<const Contact<S>> contacts,
+                std::span<ContactImpulse<S>> impulses) {
+    return orderedSum(
+        problem.rows.size(), chunk, Sums(Sums::Zero()), [&](std::size_t begin, std::size_t end) {
+          Sums sums = Sums::Zero();
+          for (std::size_t k = begin; k < end; ++k) {
+            const Row& row = problem.rows[k];
+            terms_[k] = S(0);
+            if (!(row.jn > S(0))) {
+              impulses[row.contact] = {};
+              impulses[row.contact].impact = row.impact;
+              continue;
+            }
+            const Vector3<S> jt = row.tangentialMass * row.u;
+            impulses[row.contact] = {problem.impulseOut(row.jn), problem.impulseOut(jt),
+                                     problem.turning.empty() ? Vector3<S>(Vector3<S>::Zero())
+                                                             : problem.impulseOut(problem.turning[k].l),
+                                     row.impact};
+            const Vector3<S> drift = driftOf(problem, contacts, row);
+            const auto [normal, across] =
+                power(problem, k, meanOf(problem, row.slot1), meanOf(problem, row.slot2), drift);
+            terms_[k] = normal + across;
+            sums[0] -= normal;
+            sums[1] -= across;
+            if (problem.drifting) {
+              sums[2] -= Vector3<S>(row.jn * row.n + jt).dot(drift);
+            }
+            sums[3] += std::max<S>(S(0), terms_[k]);
+          }
+          return sums;
+        });
   }
 
   /// Islands: bodies joined by contacts, immovable ones apart. dT of an island is beta a + beta^2 b under a
@@ -104,29 +132,37 @@ class ContactEnergy {
         join(row.slot1, row.slot2);
       }
     }
-    sums_.assign(n, {S(0), S(0), S(0)});
-    for (const Row& row : problem.rows) {
-      if (!(row.jn > S(0))) {
-        continue;
+    islands_.assign(n, Island{});
+    for (std::size_t k = 0; k < terms_.size(); ++k) {
+      if (terms_[k] != S(0)) {
+        Island& island = islands_[islandOf(problem.rows[k], colouring)];
+        island.gain += terms_[k];
+        island.size += terms_[k] < S(0) ? S(-terms_[k]) : terms_[k];
       }
-      const Vector3<S> drift = driftOf(problem, contacts, row);
-      const Rates before = power(problem, row, problem.initial, drift);
-      const Rates after = power(problem, row, problem.bodies, drift);
-      const S a = before.normal + before.tangential;
-      const S b = (after.normal + after.tangential - a) / S(2);
-      auto& sum = sums_[islandOf(row, colouring)];
-      sum[0] += a;
-      sum[1] += b;
-      sum[2] += (a < S(0) ? S(-a) : a) + (b < S(0) ? S(-b) : b);
     }
     const S rounding = S(8) * Eigen::NumTraits<S>::epsilon();
     bool any = false;
-    for (auto& [a, b, size] : sums_) {
-      const bool gains = a + b > rounding * size;
-      size = !gains ? S(1) : (a < S(0) && b > S(0) ? std::min<S>(S(1), S(-a / b)) : S(0));  // now beta
-      any = any || gains;
+    for (Island& island : islands_) {
+      island.gains = island.gain > rounding * island.size;
+      any = any || island.gains;
     }
     if (any) {
+      for (std::size_t k = 0; k < problem.rows.size(); ++k) {
+        const Row& row = problem.rows[k];
+        Island& island = islands_[islandOf(row, colouring)];
+        if (island.gains && row.jn > S(0)) {
+          const auto [normal, across] = power(problem, k, problem.initial[row.slot1],
+                                              problem.initial[row.slot2], driftOf(problem, contacts, row));
+          island.before += normal + across;
+        }
+      }
+      for (Island& island : islands_) {
+        if (island.gains) {
+          const S a = island.before;
+          const S b = island.gain - a;
+          island.beta = a < S(0) && b > S(0) ? std::min<S>(S(1), S(-a / b)) : S(0);
+        }
+      }
       shrink(problem, colouring);
     }
     return any;
@@ -134,17 +170,17 @@ class ContactEnergy {
 
   void shrink(ContactProblem<S>& problem, const ContactColoring& colouring) {
     for (Row& row : problem.rows) {
-      const S beta = sums_[islandOf(row, colouring)][2];
+      const S beta = islands_[islandOf(row, colouring)].beta;
       if (beta < S(1)) {
         row.jn *= beta;
-        row.jt *= beta;
+        row.u *= beta;
         if (!problem.turning.empty()) {
           problem.turning[static_cast<std::size_t>(&row - problem.rows.data())].l *= beta;
         }
       }
     }
     for (std::uint32_t slot = 0; slot < colouring.bodies().size(); ++slot) {
-      const S beta = sums_[find(slot)][2];
+      const S beta = islands_[find(slot)].beta;
       if (beta < S(1) && colouring.movable(slot)) {
         Body& b = problem.bodies[slot];
         const Body& b0 = problem.initial[slot];
@@ -172,8 +208,9 @@ class ContactEnergy {
     parent_[std::max(i, j)] = std::min(i, j);  // slots are numbered by ids: the same whatever the indices
   }
 
+  std::vector<S> terms_;  ///< J.(u^- + u^+)/2 by row
   std::vector<std::uint32_t> parent_;
-  std::vector<std::array<S, 3>> sums_;
+  std::vector<Island> islands_;  ///< by the slot that stands for it
 };
 
 }  // namespace gravel

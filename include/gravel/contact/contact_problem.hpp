@@ -13,6 +13,22 @@
 
 namespace gravel {
 
+/// What occurs among the contacts of a step.
+struct ContactKinds {
+  bool rub = false;     ///< friction
+  bool turn = false;    ///< resistance to rolling or spinning
+  bool spring = false;  ///< tangential restitution
+  bool drift = false;   ///< a second side that moves on by itself
+
+  template <Real S>
+  void include(const Contact<S>& c) {
+    rub = rub || c.material.staticFriction > S(0);
+    turn = turn || c.material.rollingFriction > S(0) || c.material.spinningFriction > S(0);
+    spring = spring || c.material.tangentialRestitution > S(0);
+    drift = drift || !(c.drift == Vector3<S>::Zero());
+  }
+};
+
 /// The problem of one step. Speeds and masses far from 1 are scaled by powers of two, which is exact, so that
 /// dust at 1e-310 m/s neither vanishes nor crawls through subnormal arithmetic.
 template <Real S>
@@ -31,53 +47,47 @@ class ContactProblem {
   bool active = false;                         ///< any contact that approaches faster than it may
   S largestApproach = S(0);  ///< largest change of a normal velocity that a contact asks for
 
+  /// Takes up bodies and contacts, and the first guess of the impulses with what it does to the bodies.
   /// \param dt [s] step that these contacts stand for, >= 0
   /// \param last impulses of the last solve in the order of contacts, zero for those that are new
+  /// \param ratio of forces that last: the guess is `ratio` times `last`; 0 for none
   /// \param fresh contacts are others, or elsewhere, than at the last call
   template <ContactBodies B>
   void gather(std::span<const Contact<S>> contacts, const B& source, const ContactColoring& colouring,
-              const S& dt, const ContactSettings<S>& settings, std::span<const ContactImpulse<S>> last,
-              bool fresh) {
-    if (fresh) {
-      friction = std::any_of(contacts.begin(), contacts.end(),
-                             [](const Contact<S>& c) { return c.material.staticFriction > S(0); });
-      const bool turns = std::any_of(contacts.begin(), contacts.end(), [](const Contact<S>& c) {
-        return c.material.rollingFriction > S(0) || c.material.spinningFriction > S(0);
-      });
-      friction = friction || turns;
-      turning.resize(turns ? contacts.size() : 0);
-    }
+              const S& dt, const ContactSettings<S>& settings, const ContactKinds& kinds,
+              std::span<const ContactImpulse<S>> last, const S& ratio, bool fresh) {
+    friction = kinds.rub || kinds.turn;
+    drifting = kinds.drift;
     const int massExponent = massExponent_;
     gatherBodies(source, colouring);
     fresh = fresh || massExponent != massExponent_ || rows.size() != contacts.size();
     rows.resize(contacts.size());
-    turning.resize(turning.empty() ? 0 : contacts.size());
-    const bool slips = friction && std::any_of(contacts.begin(), contacts.end(), [](const Contact<S>& c) {
-                         return c.material.tangentialRestitution > S(0) || !(c.drift == Vector3<S>::Zero());
-                       });
-    drifting = slips || std::any_of(contacts.begin(), contacts.end(),
-                                    [](const Contact<S>& c) { return !(c.drift == Vector3<S>::Zero()); });
-    slipTargets.assign(slips ? rows.size() : 0, Vector3<S>::Zero());
-    approach_.assign((rows.size() + chunk - 1) / chunk, S(0));
-    parallelForChunks(rows.size(), chunk, [&](std::size_t begin, std::size_t end) {
-      S most(0);
-      for (std::size_t k = begin; k < end; ++k) {
-        const ContactColoring::Row& place = colouring.rows()[k];
-        const Contact<S>& contact = contacts[place.contact];
-        if (fresh) {
-          fill(rows[k], contact, place, source);
-          if (!turning.empty()) {
-            fill(turning[k], contact, place, source);
-          }
+    turning.resize(kinds.turn ? contacts.size() : 0);
+    slipTargets.assign(friction && (kinds.drift || kinds.spring) ? rows.size() : 0, Vector3<S>::Zero());
+    const auto take = [&](std::size_t k) {
+      const ContactColoring::Row& place = colouring.rows()[k];
+      const Contact<S>& contact = contacts[place.contact];
+      if (fresh) {
+        fill(rows[k], contact, place, source);
+        if (!turning.empty()) {
+          fill(turning[k], contact, place, source);
         }
-        aim(k, contact, dt, settings, last[place.contact].normal > S(0));
-        const S excess =
-            rows[k].target - detail::normalVelocity(rows[k], bodies[place.slot1], bodies[place.slot2]);
-        most = std::max<S>(most, excess);
       }
-      approach_[begin / chunk] = most;
+      const ContactImpulse<S>& before = last[place.contact];
+      aim(k, contact, dt, settings, before.normal > S(0));
+      return Largest{rows[k].target -
+                     detail::normalVelocity(rows[k], initial[place.slot1], initial[place.slot2])};
+    };
+    Largest most = detail::sumOverRows(0, colouring.loneCount(), Largest{}, take);
+    most += detail::sumOverColours(colouring, Largest{}, [&](std::size_t k) {
+      const Largest excess = take(k);
+      const ContactImpulse<S>& before = last[rows[k].contact];
+      if (ratio > S(0) && before.normal > S(0)) {
+        guess(k, before, ratio);
+      }
+      return excess;
     });
-    largestApproach = approach_.empty() ? S(0) : *std::max_element(approach_.begin(), approach_.end());
+    largestApproach = most.value;
     active = largestApproach > S(0);
   }
 
@@ -114,12 +124,23 @@ class ContactProblem {
  private:
   static constexpr std::size_t chunk = 2048;
 
+  struct Fall {
+    Vector3<S> a;  ///< [m s^-2] zero of what nothing moves
+    S size;
+  };
+  struct Largest {
+    S value = S(0);
+    Largest& operator+=(const Largest& other) {
+      value = std::max<S>(value, other.value);
+      return *this;
+    }
+  };
+
   template <class B>
   void gatherBodies(const B& source, const ContactColoring& colouring) {
     const std::size_t n = colouring.bodies().size();
     bodies.resize(n + 1);
-    accelerations_.resize(n + 1);
-    falls_.assign(n + 1, S(0));
+    falls_.resize(n + 1);
     S fastest(0);
     S lightest(0);
     S heaviest(0);
@@ -134,8 +155,8 @@ class ContactProblem {
       if (friction) {
         b.s = r * Vector3<S>(source.angularVelocities()[i]);
       }
-      accelerations_[slot] = movable ? Vector3<S>(source.accelerations()[i]) : Vector3<S>(Vector3<S>::Zero());
-      falls_[slot] = detail::safeNorm(accelerations_[slot]);
+      const Vector3<S> a = movable ? Vector3<S>(source.accelerations()[i]) : Vector3<S>(Vector3<S>::Zero());
+      falls_[slot] = {a, detail::safeNorm(a)};
       b.inverseMass = movable ? S(source.masses()[i]) : S(0);  // the mass, until its scale is known
       b.spin = movable && r > S(0) && k > S(0) ? S(1) / k : S(0);
       fastest = std::max<S>(fastest, std::max<S>(detail::maxAbs(b.v), detail::maxAbs(b.s)));
@@ -144,7 +165,7 @@ class ContactProblem {
         lightest = lightest > S(0) ? std::min<S>(lightest, b.inverseMass) : b.inverseMass;
       }
     }
-    accelerations_[n] = Vector3<S>::Zero();
+    falls_[n] = {Vector3<S>::Zero(), S(0)};
     bodies[n] = Body{Vector3<S>::Zero(), S(0), Vector3<S>::Zero(), S(0)};
     speedExponent_ = detail::scaleExponent<S>(fastest, fastest);
     massExponent_ = detail::scaleExponent<S>(lightest, heaviest);
@@ -174,11 +195,12 @@ class ContactProblem {
     row.c1 = ratio(c.arm1, source.radii()[c.first]);
     row.c2 = c.second == staticPartner ? S(0) : ratio(c.arm2, source.radii()[c.second]);
     row.normalMass = inverse(b1.inverseMass + b2.inverseMass);
-    row.tangentialMobility =
+    const S mobility =
         b1.inverseMass + b2.inverseMass + row.c1 * row.c1 * b1.spin + row.c2 * row.c2 * b2.spin;
-    row.tangentialMass = inverse(row.tangentialMobility);
-    row.staticFriction = c.material.staticFriction;
-    row.kineticFriction = c.material.kineticFriction;
+    row.tangentialMass = inverse(mobility);
+    row.stick = c.material.staticFriction * mobility;
+    row.slide = c.material.kineticFriction * mobility;
+    row.gap = c.gap;
   }
 
   template <class B>
@@ -200,29 +222,34 @@ class ContactProblem {
     row.slides = 0;
     row.sliding = false;
     row.jn = S(0);
-    row.jt = Vector3<S>::Zero();
+    row.u = Vector3<S>::Zero();
     row.stepN = S(0);
-    row.stepT = Vector3<S>::Zero();
+    row.stepU = Vector3<S>::Zero();
     if (!turning.empty()) {
       turning[k].l = turning[k].step = Vector3<S>::Zero();
     }
-    const Body& b1 = bodies[row.slot1];
-    const Body& b2 = bodies[row.slot2];
+    const Body& b1 = initial[row.slot1];
+    const Body& b2 = initial[row.slot2];
+    const Fall& fall1 = falls_[row.slot1];
+    const Fall& fall2 = falls_[row.slot2];
     const Vector3<S> drift = drifting ? speedIn(c.drift) : Vector3<S>(Vector3<S>::Zero());
     const S drift_n = row.n.dot(drift);
     const S v_n = detail::normalVelocity(row, b1, b2) + drift_n;
-    const S a_n = row.n.dot(Vector3<S>(accelerations_[row.slot2] - accelerations_[row.slot1]));
+    const S speed = v_n < S(0) ? S(-v_n) : v_n;
+    const S allowed =
+        row.gap > S(0) ? (dt > S(0) ? speedIn(S(row.gap / dt)) : Eigen::NumTraits<S>::highest()) : S(0);
     // In a heap at rest relative accelerations vanish, and what a step brings is passed on by the others:
     // there no more than a fall of the step is rest.
-    const S falls = loaded ? S(falls_[row.slot1] + falls_[row.slot2]) : S(0);
-    const S pull = std::max<S>(S(2) * (a_n < S(0) ? S(-a_n) : a_n), falls);
-    const S threshold = speedIn(S(settings.restitutionThreshold + pull * dt));
-    const S allowed =
-        c.gap > S(0) ? (dt > S(0) ? speedIn(S(c.gap / dt)) : Eigen::NumTraits<S>::highest()) : S(0);
-    const S speed = v_n < S(0) ? S(-v_n) : v_n;
-    const bool impact = v_n < S(0) && speed > threshold && speed > allowed;
+    S pull = loaded ? S(fall1.size + fall2.size) : S(0);
+    bool fast = speed > speedIn(S(settings.restitutionThreshold + pull * dt));
+    if (fast) {
+      const S a_n = row.n.dot(Vector3<S>(fall2.a - fall1.a));
+      pull = std::max<S>(pull, S(2) * (a_n < S(0) ? S(-a_n) : a_n));
+      fast = speed > speedIn(S(settings.restitutionThreshold + pull * dt));
+    }
+    const bool impact = v_n < S(0) && fast && speed > allowed;
     row.impact = impact;  // booked otherwise than what rests, by who integrates in time
-    const bool parts = v_n > S(0) && speed > threshold;
+    const bool parts = v_n > S(0) && fast;
     // Newton's law for every contact that gets an impulse (Moreau 1988): v_n^+ = -e v_n^-. One that parts and
     // is pushed back by others may so come to approach, and bounces in its turn in the next step; to stop it
     // here would make energy: J_n (v_n^- + v_n^+) > 0.
@@ -241,12 +268,39 @@ class ContactProblem {
     }
   }
 
+  /// The impulse of the last step again.
+  void guess(std::size_t k, const ContactImpulse<S>& before, const S& ratio) {
+    Row& row = rows[k];
+    Body& b1 = bodies[row.slot1];
+    Body& b2 = bodies[row.slot2];
+    row.jn = impulseIn(S(ratio * before.normal));
+    Vector3<S> j = row.jn * row.n;
+    if (row.stick > S(0)) {
+      using std::sqrt;
+      const Vector3<S> jt = impulseIn(Vector3<S>(ratio * before.tangential));
+      row.u = (jt - row.n.dot(jt) * row.n) / row.tangentialMass;
+      const S size_sq = row.u.squaredNorm();
+      const S stick = row.stick * row.jn;
+      if (size_sq > stick * stick) {
+        row.u *= row.slide * row.jn / S(sqrt(size_sq));
+      }
+      const Vector3<S> across = row.tangentialMass * row.u;
+      j += across;
+      detail::twist(row, b1, b2, across);
+    }
+    detail::push(b1, b2, j);
+    if (!turning.empty()) {
+      detail::TurningRow<S>& row2 = turning[k];
+      row2.l = resistTurning<S>(impulseIn(Vector3<S>(ratio * before.turning)), row.n, row.jn, row2.rolling,
+                                row2.spinning);
+      detail::turn(row2, b1, b2, row2.l);
+    }
+  }
+
   static S inverse(const S& x) { return x > S(0) ? S(1) / x : S(0); }
   static S ratio(const S& arm, const S& radius) { return radius > S(0) ? arm / radius : S(0); }
 
-  std::vector<Vector3<S>> accelerations_;  ///< [m s^-2] by slot, of the movable
-  std::vector<S> falls_;                   ///< their sizes
-  std::vector<S> approach_;
+  std::vector<Fall> falls_;  ///< by slot
   int speedExponent_ = 0;
   int massExponent_ = 0;
 };

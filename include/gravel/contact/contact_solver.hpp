@@ -55,7 +55,12 @@ class ContactSolver {
   void begin(std::span<const Contact<S>> contacts, const B& bodies) {
     contacts_ = contacts;
     fresh_ = true;
-    if (!sameAsBefore(contacts, bodies)) {
+    const bool same = sameAsBefore(contacts, bodies);
+    kinds_ = {};
+    for (const Contact<S>& c : contacts) {
+      kinds_.include(c);
+    }
+    if (!same) {
       coloring_.build(contacts, bodies);
       handOn(contacts);
     }
@@ -73,15 +78,15 @@ class ContactSolver {
     ContactReport<S> report;
     bool solved = false;
     if (!contacts.empty()) {
-      problem_.gather(contacts, bodies, coloring_, dt, settings_, impulses_, fresh_);
+      // Forces that last give impulses in proportion of the steps.
+      const S ratio = settings_.warmStart && memoryStep_ > S(0) ? S(dt / memoryStep_) : S(0);
+      problem_.gather(contacts, bodies, coloring_, dt, settings_, kinds_, impulses_, ratio, fresh_);
       fresh_ = false;
       if (problem_.active) {
-        guess(dt);
         report = std::visit([&](auto& algorithm) { return algorithm.solve(problem_, coloring_, settings_); },
                             algorithm_);
-        energy_.settle(problem_, coloring_, contacts, report);
+        energy_.settle(problem_, coloring_, contacts, report, impulses_);
         problem_.scatter(bodies, coloring_);
-        takeImpulses();
         solved = true;
       }
     }
@@ -188,46 +193,10 @@ class ContactSolver {
     }
   }
 
-  /// First guesses from the last step: forces that last, hence impulses in proportion of the steps.
-  void guess(const S& dt) {
-    if (!settings_.warmStart || !(memoryStep_ > S(0))) {
-      return;
-    }
-    const S ratio = dt / memoryStep_;
-    const std::size_t lone = coloring_.loneCount();
-    parallelFor(problem_.rows.size() - lone, 2048, [&](std::size_t k) {
-      detail::SolverRow<S>& row = problem_.rows[lone + k];
-      const ContactImpulse<S>& last = impulses_[row.contact];
-      if (!(last.normal > S(0))) {
-        return;
-      }
-      row.jn = problem_.impulseIn(S(ratio * last.normal));
-      if (problem_.friction && row.staticFriction > S(0)) {
-        const Vector3<S> jt = problem_.impulseIn(Vector3<S>(ratio * last.tangential));
-        row.jt = clampToCone<S>(Vector3<S>(jt - row.n.dot(jt) * row.n), row.jn, row.staticFriction,
-                                row.kineticFriction);
-      }
-      if (!problem_.turning.empty()) {
-        detail::TurningRow<S>& turning = problem_.turning[lone + k];
-        turning.l = resistTurning<S>(problem_.impulseIn(Vector3<S>(ratio * last.turning)), row.n, row.jn,
-                                     turning.rolling, turning.spinning);
-      }
-    });
-  }
-
-  void takeImpulses() {
-    parallelFor(problem_.rows.size(), 2048, [&](std::size_t k) {
-      const detail::SolverRow<S>& row = problem_.rows[k];
-      impulses_[row.contact] = {problem_.impulseOut(row.jn), problem_.impulseOut(row.jt),
-                                problem_.turning.empty() ? Vector3<S>(Vector3<S>::Zero())
-                                                         : problem_.impulseOut(problem_.turning[k].l),
-                                row.impact};
-    });
-  }
-
   std::variant<SequentialImpulses<S>> algorithm_;
   ContactSettings<S> settings_;
   ContactColoring coloring_;
+  ContactKinds kinds_;
   ContactProblem<S> problem_;
   ContactEnergy<S> energy_;
   PositionalCorrection<S> correction_;

@@ -29,46 +29,62 @@ Scalar maxAbs(const Vector3<Scalar>& v) {
   return largest;
 }
 
+/// |v| of a vector whose square leaves the range of numbers.
+template <Real Scalar>
+Scalar scaledNorm(const Vector3<Scalar>& v) {
+  const Scalar largest = maxAbs(v);
+  if (!(largest > Scalar(0)) || !std::isfinite(largest)) {
+    return largest;
+  }
+  int exponent = 0;
+  (void)std::frexp(largest, &exponent);
+  const Vector3<Scalar> scaled(std::ldexp(v[0], -exponent), std::ldexp(v[1], -exponent),
+                               std::ldexp(v[2], -exponent));
+  return std::ldexp(std::sqrt(scaled.squaredNorm()), exponent);
+}
+
 /// |v| without overflow or underflow of the squares.
 template <Real Scalar>
-Scalar safeNorm(const Vector3<Scalar>& v) {
+[[gnu::always_inline]] inline Scalar safeNorm(const Vector3<Scalar>& v) {
   using std::sqrt;
   const Scalar sq = v.squaredNorm();
   if constexpr (std::is_floating_point_v<Scalar>) {
     constexpr Scalar tiny = std::numeric_limits<Scalar>::min() / std::numeric_limits<Scalar>::epsilon();
     if (!(sq > tiny) || !(sq < std::numeric_limits<Scalar>::max())) {
-      const Scalar largest = maxAbs(v);
-      if (!(largest > Scalar(0)) || !std::isfinite(largest)) {
-        return largest;
-      }
-      int exponent = 0;
-      (void)std::frexp(largest, &exponent);
-      const Vector3<Scalar> scaled(std::ldexp(v[0], -exponent), std::ldexp(v[1], -exponent),
-                                   std::ldexp(v[2], -exponent));
-      return std::ldexp(std::sqrt(scaled.squaredNorm()), exponent);
+      return scaledNorm(v);
     }
   }
   return Scalar(sqrt(sq));
 }
 
-/// v / |v|; v itself where it is zero or not finite.
+/// v / |v|, of length |v| in the range where squares leave that of numbers.
 template <Real Scalar>
-Vector3<Scalar> safeUnit(const Vector3<Scalar>& v) {
-  const Scalar length = safeNorm(v);
+Vector3<Scalar> scaledUnit(const Vector3<Scalar>& v) {
+  int exponent = 0;
+  (void)std::frexp(maxAbs(v), &exponent);
+  const Vector3<Scalar> scaled(std::ldexp(v[0], -exponent), std::ldexp(v[1], -exponent),
+                               std::ldexp(v[2], -exponent));
+  return scaled / std::sqrt(scaled.squaredNorm());
+}
+
+/// v / length for length = |v|; v itself where it is zero or not finite.
+template <Real Scalar>
+[[gnu::always_inline]] inline Vector3<Scalar> safeUnit(const Vector3<Scalar>& v, const Scalar& length) {
   if (!(length > Scalar(0))) {
     return v;
   }
   if constexpr (std::is_floating_point_v<Scalar>) {
     if (length < std::numeric_limits<Scalar>::min() / std::numeric_limits<Scalar>::epsilon() ||
         !std::isfinite(length)) {  // v / length would lose digits: bring it to order one first
-      int exponent = 0;
-      (void)std::frexp(maxAbs(v), &exponent);
-      const Vector3<Scalar> scaled(std::ldexp(v[0], -exponent), std::ldexp(v[1], -exponent),
-                                   std::ldexp(v[2], -exponent));
-      return scaled / std::sqrt(scaled.squaredNorm());
+      return scaledUnit(v);
     }
   }
   return v / length;
+}
+
+template <Real Scalar>
+Vector3<Scalar> safeUnit(const Vector3<Scalar>& v) {
+  return safeUnit(v, safeNorm(v));
 }
 
 }  // namespace detail

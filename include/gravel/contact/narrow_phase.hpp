@@ -133,6 +133,11 @@ class NarrowPhase {
     return std::max<S>(settings.margin, std::min<S>(closing, restingMargin() * radii));
   }
 
+  /// What marginOf() is at most.
+  static S widestMargin(const NarrowPhaseSettings<S>& settings, const S& radii) {
+    return settings.step > S(0) ? std::max<S>(settings.margin, restingMargin() * radii) : settings.margin;
+  }
+
   static bool mayRest(const NarrowPhaseSettings<S>& settings, const ContactKeys& keys, Cursor& cursor) {
     if (!settings.resting) {
       return true;
@@ -168,26 +173,30 @@ class NarrowPhase {
     Vector3<S> r_ij = Vector3<S>(bodies.positions()[j]) - Vector3<S>(bodies.positions()[i]);
     Vector3<S> drift = Vector3<S>::Zero();
     domain.minimumImage(r_ij, drift, settings.time);
-    const S margin = marginOf(settings, r_i + r_j,
-                              [&] { return S(accelerationOf(bodies, i) + accelerationOf(bodies, j)); });
-    const S reach = r_i + r_j + margin;
-    if (detail::maxAbs(r_ij) > reach) {
+    const S reach = r_i + r_j;
+    if (detail::maxAbs(r_ij) > reach + widestMargin(settings, reach)) {
       return;  // the common case, before anything else is loaded
     }
-    const std::uint64_t id_i = bodies.ids()[i];
-    const std::uint64_t id_j = bodies.ids()[j];
-    const auto touch = sphereSphere<S>(r_ij, r_i, r_j, id_i, id_j, settings.epsilon, margin);
-    if (!touch || detail::isTracer(bodies, i) || detail::isTracer(bodies, j) ||
+    const S distance = detail::safeNorm(r_ij);
+    const bool overlaps = distance < reach + settings.margin;
+    const auto falls = [&] { return S(accelerationOf(bodies, i) + accelerationOf(bodies, j)); };
+    if (!(reach > S(0)) || (!overlaps && !(distance < reach + marginOf(settings, reach, falls)))) {
+      return;
+    }
+    if (detail::isTracer(bodies, i) || detail::isTracer(bodies, j) ||
         !(detail::isMovable(bodies, i) || detail::isMovable(bodies, j))) {
       return;
     }
+    const std::uint64_t id_i = bodies.ids()[i];
+    const std::uint64_t id_j = bodies.ids()[j];
     const std::uint32_t m_i = bodies.materials()[i];
     const std::uint32_t m_j = bodies.materials()[j];
-    if (touch->gap >= settings.margin && !mayRest(settings, {id_i, id_j}, cursor)) {
+    if (!overlaps && !mayRest(settings, {id_i, id_j}, cursor)) {
       return;
     }
     const Material<S>& surface_i = surface(materials, m_i);
-    part.push_back(Contact<S>{i, j, id_i, id_j, touch->normal, touch->gap, touch->arm1, touch->arm2,
+    const Touch<S> touch = touchAt<S>(r_ij, distance, r_i, reach, id_i, id_j, settings.epsilon);
+    part.push_back(Contact<S>{i, j, id_i, id_j, touch.normal, touch.gap, touch.arm1, touch.arm2,
                               m_i == m_j ? surface_i : mix(surface_i, surface(materials, m_j)), drift});
   }
 

@@ -27,46 +27,26 @@ struct RowImpulses {
     }
   };
 
-  static void push(Body& b1, Body& b2, const Vector3<S>& j) {
-    if (b1.inverseMass > S(0)) {  // immovable bodies are shared between threads: never written
-      b1.v -= b1.inverseMass * j;
-    }
-    if (b2.inverseMass > S(0)) {
-      b2.v += b2.inverseMass * j;
-    }
-  }
-
-  static void twist(const Row& row, Body& b1, Body& b2, const Vector3<S>& j) {
-    const Vector3<S> turn = row.n.cross(j);
-    if (b1.inverseMass > S(0)) {
-      b1.s -= (row.c1 * b1.spin) * turn;
-    }
-    if (b2.inverseMass > S(0)) {
-      b2.s -= (row.c2 * b2.spin) * turn;
-    }
-  }
-
-  /// Friction of a row for its normal impulse. Sizes are compared as speeds, which are of order one.
-  /// \return the change of the tangential impulse
-  static Vector3<S> rubbed(Row& row, const Vector3<S>& slip, Progress& progress) {
+  /// Friction of a row for its normal impulse. \return the change of the tangential impulse
+  [[gnu::always_inline]] static inline Vector3<S> rubbed(Row& row, const Vector3<S>& slip,
+                                                         Progress& progress) {
     using std::sqrt;
-    Vector3<S> jt = row.jt - row.tangentialMass * slip;
-    const S size_sq = Vector3<S>(row.tangentialMobility * jt).squaredNorm();
+    Vector3<S> u = row.u - slip;
+    const S size_sq = u.squaredNorm();
     // A contact that keeps changing its mind between sticking and sliding slides: sweeps must end.
-    const S stick =
-        (row.slides < patience ? row.staticFriction : row.kineticFriction) * row.jn * row.tangentialMobility;
+    const S stick = (row.slides < patience ? row.stick : row.slide) * row.jn;
     const bool slides = size_sq > stick * stick;
     if (slides) {
       row.slides = static_cast<std::uint8_t>(row.slides + (row.sliding ? 0U : 1U));
-      jt *= row.kineticFriction * row.jn * row.tangentialMobility / S(sqrt(size_sq));
+      u *= row.slide * row.jn / S(sqrt(size_sq));
     }
     row.sliding = slides;
-    Vector3<S> dj = jt - row.jt;
-    row.jt = jt;
-    row.stepT += dj;
-    const Vector3<S> change = row.tangentialMobility * dj;
-    progress += {change.squaredNorm(), change.dot(row.stepT), change.dot(dj)};
-    return dj;
+    const Vector3<S> du = u - row.u;
+    row.u = u;
+    row.stepU += du;
+    const S change_sq = du.squaredNorm();
+    progress += {change_sq, row.tangentialMass * du.dot(row.stepU), row.tangentialMass * change_sq};
+    return row.tangentialMass * du;
   }
 
   static Progress rub(ContactProblem<S>& problem, std::size_t k, Body& b1, Body& b2) {
@@ -80,15 +60,6 @@ struct RowImpulses {
     push(b1, b2, dj);
     twist(row, b1, b2, dj);
     return progress;
-  }
-
-  static void turn(const TurningRow<S>& row, Body& b1, Body& b2, const Vector3<S>& l) {
-    if (b1.inverseMass > S(0)) {
-      b1.s -= (row.q1 * b1.spin) * l;
-    }
-    if (b2.inverseMass > S(0)) {
-      b2.s += (row.q2 * b2.spin) * l;
-    }
   }
 
   /// Resistance to rolling and spinning of a row for its normal impulse.

@@ -24,12 +24,9 @@ namespace gravel {
 template <Real S>
 class SequentialImpulses : private detail::RowImpulses<S> {
   using Base = detail::RowImpulses<S>;
-  using Base::push;
   using Base::resist;
   using Base::rub;
   using Base::rubbed;
-  using Base::turn;
-  using Base::twist;
   using typename Base::Body;
   using typename Base::Progress;
   using typename Base::Row;
@@ -37,18 +34,19 @@ class SequentialImpulses : private detail::RowImpulses<S> {
  public:
   static constexpr const char* name() { return "sequential impulses"; }
 
-  /// Sweeps until the settings are content. `problem.rows` come with their first guess in jn and jt.
+  /// Sweeps until the settings are content. `problem.rows` come with their first guess, and `problem.bodies`
+  /// with what it does to them.
   /// \return iterations and residual; the caller adds the rest
   ContactReport<S> solve(ContactProblem<S>& problem, const ContactColoring& colouring,
                          const ContactSettings<S>& settings) {
     using std::sqrt;
     ContactReport<S> report;
-    eachOf(0, colouring.loneCount(), [&](std::size_t k) { return strike(problem, k); });
+    detail::sumOverRows(0, colouring.loneCount(), Progress{},
+                        [&](std::size_t k) { return strike(problem, k); });
     if (colouring.loneCount() == problem.rows.size()) {
       report.iterations = 1;  // exact
       return report;
     }
-    everyColour(colouring, [&](std::size_t k) { return applyGuess(problem, k); });
     const S rounding = S(8) * Eigen::NumTraits<S>::epsilon();
     const S enough = std::max<S>(settings.tolerance, rounding) * problem.largestApproach;
     const bool friction = problem.friction;
@@ -58,9 +56,12 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     S sizeThen = leastSize;
     int age = 0;
     int turns = 0;
-    begin(problem);
+    const bool accelerate = settings.accelerate && settings.maxIterations > 2;
+    if (accelerate) {
+      begin(problem);
+    }
     while (true) {
-      const Progress now = everyColour(colouring, [&](std::size_t k) {
+      const Progress now = detail::sumOverColours(colouring, Progress{}, [&](std::size_t k) {
         return friction ? relax<true>(problem, k, beta) : relax<false>(problem, k, beta);
       });
       ++report.iterations;
@@ -69,7 +70,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       if (!(change > enough) || report.iterations >= settings.maxIterations) {
         return report;
       }
-      if (settings.accelerate) {
+      if (accelerate) {
         const S old = beta;
         turns += now.along < S(0) ? 1 : 0;
         age = now.along < S(0) ? 0 : age + 1;
@@ -91,7 +92,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
   }
 
  private:
-  static constexpr std::size_t chunk = 512;
+  static constexpr std::size_t chunk = 2048;
   static constexpr int stallSweeps = 32;
 
   /// Step of a body's velocities from sweep to sweep.
@@ -104,14 +105,14 @@ class SequentialImpulses : private detail::RowImpulses<S> {
 
   void begin(const ContactProblem<S>& problem) {
     bodySteps_.resize(problem.bodies.size());
-    parallelFor(problem.bodies.size(), 4 * chunk, [&](std::size_t slot) {
+    parallelFor(problem.bodies.size(), chunk, [&](std::size_t slot) {
       bodySteps_[slot] = BodyStep{problem.bodies[slot].v, problem.bodies[slot].s};
     });
   }
 
   /// Velocities follow the impulses beyond their last step: they are linear in the impulses.
   void coast(ContactProblem<S>& problem, const S& old, const S& beta) {
-    parallelFor(problem.bodies.size(), 4 * chunk, [&](std::size_t slot) {
+    parallelFor(problem.bodies.size(), chunk, [&](std::size_t slot) {
       BodyStep& step = bodySteps_[slot];
       Body& b = problem.bodies[slot];
       step.dv = old * step.dv + Vector3<S>(b.v - step.v);
@@ -123,52 +124,6 @@ class SequentialImpulses : private detail::RowImpulses<S> {
         step.s = b.s;
       }
     });
-  }
-
-  /// Calls f(k) for rows that share no movable body; chunks depend on their number alone.
-  template <class F>
-  Progress eachOf(std::size_t begin, std::size_t end, F&& f) {
-    const auto run = [&](std::size_t from, std::size_t to) {
-      Progress mine;
-      for (std::size_t k = from; k < to; ++k) {
-        mine += f(k);
-      }
-      return mine;
-    };
-    if (end - begin < 4 * chunk) {  // not worth the threads
-      return run(begin, end);
-    }
-    return orderedSum(end - begin, chunk, Progress{},
-                      [&](std::size_t from, std::size_t to) { return run(begin + from, begin + to); });
-  }
-
-  template <class F>
-  Progress everyColour(const ContactColoring& colouring, F&& f) {
-    Progress all;
-    for (std::size_t c = 0; c < colouring.colours(); ++c) {
-      all += eachOf(colouring.begin(c), colouring.end(c), f);
-    }
-    const std::size_t overflow = colouring.colours();
-    for (std::size_t k = colouring.begin(overflow); k < colouring.end(overflow); ++k) {
-      all += f(k);
-    }
-    return all;
-  }
-
-  static Progress applyGuess(ContactProblem<S>& problem, std::size_t k) {
-    const Row& row = problem.rows[k];
-    if (row.jn > S(0)) {
-      Body& b1 = problem.bodies[row.slot1];
-      Body& b2 = problem.bodies[row.slot2];
-      push(b1, b2, Vector3<S>(row.jn * row.n + row.jt));
-      if (problem.friction) {
-        twist(row, b1, b2, row.jt);
-      }
-      if (!problem.turning.empty()) {
-        turn(problem.turning[k], b1, b2, problem.turning[k].l);
-      }
-    }
-    return {};
   }
 
   /// A contact alone: in two strokes, stop and rebound, so that a head-on blow ends at exactly its target.
@@ -191,7 +146,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
         b2.v += (share2 * dv) * row.n;
       }
     }
-    if (row.staticFriction > S(0)) {
+    if (row.stick > S(0)) {
       rub(problem, k, b1, b2);
     }
     if (!problem.turning.empty() && problem.turning[k].mass > S(0)) {
@@ -201,7 +156,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       const S enough = Eigen::NumTraits<S>::epsilon() * speed;
       for (int turn = 0; turn < 200; ++turn) {
         Progress progress = resist(problem, k, b1, b2);
-        if (row.staticFriction > S(0)) {
+        if (row.stick > S(0)) {
           progress += rub(problem, k, b1, b2);
         }
         if (!(progress.change_sq > enough * enough)) {
@@ -234,22 +189,22 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     progress.size = dj * change;
     Vector3<S> j = dj * row.n;
     if constexpr (Friction) {
-      if (row.staticFriction > S(0)) {
-        row.stepT *= beta;
-        row.jt += row.stepT;
-        if (row.jn > S(0) || row.jt != Vector3<S>::Zero()) {
+      if (row.stick > S(0)) {
+        row.stepU *= beta;
+        row.u += row.stepU;
+        if (row.jn > S(0) || row.u != Vector3<S>::Zero()) {
           Vector3<S> slip = v_rel - v_n * row.n - Vector3<S>(row.c1 * b1.s + row.c2 * b2.s).cross(row.n);
           if (!problem.slipTargets.empty()) {
             slip -= problem.slipTargets[k];
           }
           const Vector3<S> dt = rubbed(row, slip, progress);
           j += dt;
-          twist(row, b1, b2, dt);
+          detail::twist(row, b1, b2, dt);
         }
       }
     }
     if (j != Vector3<S>::Zero()) {
-      push(b1, b2, j);
+      detail::push(b1, b2, j);
     }
     if constexpr (Friction) {
       if (!problem.turning.empty()) {

@@ -24,16 +24,16 @@ struct SolverRow {
   Vector3<S> n;
   S c1;  ///< arm / radius
   S c2;
-  S normalMass;          ///< 1/(1/m1 + 1/m2)
-  S tangentialMass;      ///< 1/(1/m1 (1 + c1^2/k1) + 1/m2 (1 + c2^2/k2))
-  S tangentialMobility;  ///< 1/tangentialMass
-  S target;              ///< v_n after the blow is at least this
-  S staticFriction;
-  S kineticFriction;
+  S normalMass;      ///< 1/(1/m1 + 1/m2)
+  S tangentialMass;  ///< 1/(1/m1 (1 + c1^2/k1) + 1/m2 (1 + c2^2/k2))
+  S stick;   ///< static friction over tangentialMass: the most that `u` may be, over jn, where it sticks
+  S slide;   ///< kinetic friction over tangentialMass
+  S gap;     ///< [m]
+  S target;  ///< v_n after the blow is at least this
   S jn;
-  Vector3<S> jt;
-  S stepN;  ///< of the impulses, from sweep to sweep
-  Vector3<S> stepT;
+  Vector3<S> u;  ///< tangential impulse over tangentialMass: the change of slip that it makes
+  S stepN;       ///< of jn and u, from sweep to sweep
+  Vector3<S> stepU;
   std::uint32_t slot1;
   std::uint32_t slot2;
   std::uint32_t contact;
@@ -57,17 +57,52 @@ struct TurningRow {
 };
 
 template <Real S>
-S normalVelocity(const SolverRow<S>& row, const SolverBody<S>& b1, const SolverBody<S>& b2) {
+[[gnu::always_inline]] inline S normalVelocity(const SolverRow<S>& row, const SolverBody<S>& b1,
+                                               const SolverBody<S>& b2) {
   return row.n.dot(Vector3<S>(b2.v - b1.v));
 }
 
 template <Real S>
-Vector3<S> slipVelocity(const SolverRow<S>& row, const SolverBody<S>& b1, const SolverBody<S>& b2) {
+[[gnu::always_inline]] inline Vector3<S> slipVelocity(const SolverRow<S>& row, const SolverBody<S>& b1,
+                                                      const SolverBody<S>& b2) {
   const Vector3<S> v_rel = b2.v - b1.v;
   return v_rel - row.n.dot(v_rel) * row.n - Vector3<S>(row.c1 * b1.s + row.c2 * b2.s).cross(row.n);
 }
 
-/// v += 2^exponent, exactly; a scalar that is not built in stays as it is.
+template <Real S>
+[[gnu::always_inline]] inline void push(SolverBody<S>& b1, SolverBody<S>& b2, const Vector3<S>& j) {
+  if (b1.inverseMass > S(0)) {  // immovable bodies are shared between threads: never written
+    b1.v -= b1.inverseMass * j;
+  }
+  if (b2.inverseMass > S(0)) {
+    b2.v += b2.inverseMass * j;
+  }
+}
+
+template <Real S>
+[[gnu::always_inline]] inline void twist(const SolverRow<S>& row, SolverBody<S>& b1, SolverBody<S>& b2,
+                                         const Vector3<S>& j) {
+  const Vector3<S> turn = row.n.cross(j);
+  if (b1.inverseMass > S(0)) {
+    b1.s -= (row.c1 * b1.spin) * turn;
+  }
+  if (b2.inverseMass > S(0)) {
+    b2.s -= (row.c2 * b2.spin) * turn;
+  }
+}
+
+template <Real S>
+[[gnu::always_inline]] inline void turn(const TurningRow<S>& row, SolverBody<S>& b1, SolverBody<S>& b2,
+                                        const Vector3<S>& l) {
+  if (b1.inverseMass > S(0)) {
+    b1.s -= (row.q1 * b1.spin) * l;
+  }
+  if (b2.inverseMass > S(0)) {
+    b2.s += (row.q2 * b2.spin) * l;
+  }
+}
+
+/// x 2^exponent, exactly; a scalar that is not built in stays as it is.
 template <Real S>
 S scaled(const S& x, int exponent) {
   if constexpr (std::is_floating_point_v<S>) {
