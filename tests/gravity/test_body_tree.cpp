@@ -136,7 +136,8 @@ TEST_CASE("the first look at the field is right within a factor of three for mos
     gravel::detail::TreeMoments<double, double, gravel::detail::HarmonicTerms> moments;
     moments.compute(tree, 2);
     gravel::detail::FieldStrength<double, double> strength;
-    strength.compute(tree, 1.0);
+    strength.compute(tree, 1.0, gravel::detail::PeriodicImages<double, double>(),
+                     gravel::detail::ImageField<double, double>());
     const GravityOracle oracle = bruteGravity(points.positions, points.masses, 1.0, 0.0);
     std::size_t close = 0;
     for (const auto& cell : tree.cells) {

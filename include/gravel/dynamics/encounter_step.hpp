@@ -135,15 +135,16 @@ void lookAtLikeliest(const Bodies<Scalar, Layout>& bodies, const S& G, const S& 
 /// bodies O(N^2), about as dear as their gravity, and also no pair meets deeper than a quarter of the smaller
 /// radius in a step; above O(N), and no sphere moves by more than a quarter of its radius (see
 /// `stepFromMotion`).
+/// \param pairs false where pairs may be nearest through images: above is then meant for any number
 template <Real Scalar, class Layout>
 Scalar stepFromEncounters(const Bodies<Scalar, Layout>& bodies, const Scalar& G, const Scalar& softening,
-                          const StepLimits<Scalar>& limits) {
+                          const StepLimits<Scalar>& limits, bool pairs = true) {
   using S = detail::RateScalar<Scalar>;
   using std::sqrt;
   const S T = S(limits.largest) / S(limits.factor);
   S sum(0);
   S approach(0);
-  if (bodies.size() <= encounterPairs) {
+  if (pairs && bodies.size() <= encounterPairs) {
     detail::EncounterTable<S>(bodies).look(S(G), S(softening), T, sum, approach);
   } else {
     detail::lookAtLikeliest<S>(bodies, S(G), S(softening), T, sum, approach);

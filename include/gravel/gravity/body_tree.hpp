@@ -41,6 +41,12 @@ struct TreeCell {
   }
 };
 
+/// A cell as a source: the cell itself (image 0), or its image in a periodic system.
+struct ImageCell {
+  std::uint32_t cell = 0;
+  std::uint32_t image = 0;
+};
+
 /// Positions and masses in columns in the order of the tree; cells breadth first, the root at 0.
 template <Real S, Real F>
 struct BodyTree {

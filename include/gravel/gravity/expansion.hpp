@@ -143,6 +143,22 @@ struct Expansion {
     }
   }
 
+  /// Where the moment (a, b, c) stands.
+  static constexpr std::size_t indexOf(int a, int b, int c) {
+    return static_cast<std::size_t>(M::row(a + b + c, c) + b);
+  }
+
+  /// The coefficients of a local expansion in the rows of derivatives.
+  template <class T>
+  static void spreadOut(int order, const T* local, T* d) {
+    for (int n = 0; n <= order; ++n) {
+      for (int c = 0; c <= M::lastZ(n); ++c) {
+        std::copy_n(local + M::row(n, c), n - c + 1, d + D::row(n, c));
+      }
+      fillTrace(n, d);
+    }
+  }
+
   /// The rows c = 2 of order n of harmonic derivatives, from the rows c = 0.
   template <class T>
   static void fillTrace(int n, T* d) {

@@ -17,9 +17,12 @@ class FarField {
   using Moments = TreeMoments<S, F, Terms>;
   using Cell = TreeCell<F>;
 
-  FarField(const Tree& tree, const Moments& moments, int order, int first, const S& softening_sq)
+  /// \param shifts of the images
+  FarField(const Tree& tree, const Moments& moments, const std::vector<Vector3<S>>& shifts, int order,
+           int first, const S& softening_sq)
       : tree_(tree),
         moments_(moments),
+        shifts_(shifts),
         order_(order),
         first_(first),
         softening_sq_(softening_sq),
@@ -35,7 +38,7 @@ class FarField {
 
   /// A cell's local expansion about the centre of each of its children, one after another.
   void shiftToChildren(const Cell& cell, const F* from, F* to) {
-    spreadOut(from);
+    X::spreadOut(order_, from, spread_.data());
     for (std::uint32_t child = 0; child < cell.children; child += Batch::width) {
       alignas(64) F r[3][Batch::width] = {};
       const std::size_t count = std::min<std::size_t>(Batch::width, cell.children - child);
@@ -64,8 +67,8 @@ class FarField {
     batches_ = 0;
   }
 
-  void add(const Cell& sink, std::uint32_t source) {
-    prefetch(moments_.of(source));
+  void add(const Cell& sink, const ImageCell& source) {
+    prefetch(moments_.of(source.cell));
     waiting_[batched_++] = source;
     if (batched_ == Batch::size) {
       flush(sink);
@@ -94,7 +97,7 @@ class FarField {
 
   /// Adds a cell's local expansion at its bodies.
   void evaluate(const Cell& cell, const F* local, SinkFields<S>& out) {
-    spreadOut(local);
+    X::spreadOut(order_, local, spread_.data());
     for (std::uint32_t i = cell.first; i < cell.last; i += Batch::width) {
       alignas(64) F r[3][Batch::width] = {};
       const std::size_t count = std::min<std::size_t>(Batch::width, cell.last - i);
@@ -137,15 +140,16 @@ class FarField {
     alignas(64) F r[5][Batch::size];
     auto* lanes = reinterpret_cast<F*>(laneMoments_.data());
     for (std::size_t w = 0; w < Batch::size; ++w) {
-      const std::uint32_t s = waiting_[w < batched_ ? w : 0];
-      const Cell& source = tree_.cells[s];
+      const ImageCell s = waiting_[w < batched_ ? w : 0];
+      const Cell& source = tree_.cells[s.cell];
+      const Vector3<S>& shift = shifts_[s.image];
       F r_sq = F(softening_sq_);
       for (int axis = 0; axis < 3; ++axis) {
-        r[axis][w] = sink.centre[axis] - source.centre[axis];
+        r[axis][w] = (sink.centre[axis] - source.centre[axis]) - F(shift[axis]);
         r_sq += r[axis][w] * r[axis][w];
       }
       r[3][w] = r_sq;
-      const F* m = moments_.of(s);
+      const F* m = moments_.of(s.cell);
       F* to = lanes + w / Batch::width * terms_ * Batch::width + w % Batch::width;
       for (std::size_t k = 0; k < terms_; ++k) {
         to[k * Batch::width] = m[k];
@@ -173,25 +177,16 @@ class FarField {
     }
   }
 
-  /// A local expansion in the rows of derivatives.
-  void spreadOut(const F* local) {
-    for (int n = 0; n <= order_; ++n) {
-      for (int c = 0; c <= M::lastZ(n); ++c) {
-        std::copy_n(local + M::row(n, c), n - c + 1, spread_.data() + D::row(n, c));
-      }
-      X::fillTrace(n, spread_.data());
-    }
-  }
-
   const Tree& tree_;
   const Moments& moments_;
+  const std::vector<Vector3<S>>& shifts_;
   int order_;
   int first_;
   S softening_sq_;
   std::size_t terms_;
   std::vector<F> spread_;
   std::vector<V> laneMoments_, laneLocals_, laneDerivatives_, laneRegular_, laneMoved_;
-  std::array<std::uint32_t, Batch::size> waiting_{};
+  std::array<ImageCell, Batch::size> waiting_{};
   std::size_t batched_ = 0;
   std::size_t batches_ = 0;
 };

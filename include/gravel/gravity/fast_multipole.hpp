@@ -23,6 +23,8 @@ namespace gravel {
 /// Cost: O(N) but for the sort; memory about 300 bytes a body at the default tolerance. The
 /// result is a function of the input alone: not of earlier calls, nor of the number of threads. One object
 /// serves one caller at a time; up to 2^32 - 1 bodies.
+///
+/// In a domain that is not open the images of all bodies pull too; see setDomain.
 template <Real S>
 class FastMultipole {
  public:
@@ -34,6 +36,9 @@ class FastMultipole {
     tolerance_ = tolerance;
   }
   const S& tolerance() const { return tolerance_; }
+
+  /// As DirectSum::setDomain. Images count within the tolerance.
+  void setDomain(const Domain<S>& domain, const S& time = S(0)) { images_.setDomain(domain, time); }
 
   /// Whether that many bodies are expected to cost less than by the direct sum, and the tolerance can be
   /// kept.
@@ -78,11 +83,17 @@ class FastMultipole {
   using F = std::conditional_t<std::is_same_v<S, float>, double, S>;
 
   static constexpr std::uint32_t leafSize = 64;
+  static constexpr std::size_t mostBodies = std::numeric_limits<std::uint32_t>::max();
 
   template <class Positions, class Masses>
   void evaluate(const Positions& positions, const Masses& masses, const S& G, const S& softening,
                 bool withPotential) {
-    units_ = detail::GravityUnits<S>(positions, masses, G, softening);
+    if (positions.size() > mostBodies) {
+      detail::refuse("number of bodies of a fast multipole sum", std::to_string(positions.size()),
+                     "at most 2^32 - 1");
+    }
+    units_ = detail::GravityUnits<S>(positions, masses, G, softening, images_.box());
+    images_.prepare(units_.perLength(), units_.low(), units_.high(), tolerance_);
     gather(positions, masses);
     fields_.clear(tree_.size(), withPotential);
     count_ = {};
@@ -103,20 +114,31 @@ class FastMultipole {
     const detail::MultipolePlan& plan = detail::planMultipoles(tolerance_);
     const detail::WalkLimits limits{plan.order, plan.pairsDirect, 8 * plan.pairsDirect};
     moments.compute(tree_, limits.order);
-    strength_.compute(tree_, F(F(tolerance_) / F(plan.safety)));
+    if (!images_.isOpen()) {
+      farImages_.gather(images_, tree_.x.data(), tree_.y.data(), tree_.z.data(), tree_.m.data(),
+                        tree_.size());
+    }
+    // Accelerations in a periodic system are what is left of forces that cancel.
+    const F safety = F(plan.safety) * F(images_.isOpen() ? 1.0 : 1.7);
+    strength_.compute(tree_, F(F(tolerance_) / safety), images_, farImages_);
     using Walk = detail::MultipoleWalk<S, F, Terms>;
-    Walk first(tree_, moments, limits, softening_sq, fields_);
+    Walk first(tree_, moments, images_.shifts(), limits, softening_sq, fields_);
     const std::size_t share = std::max<std::size_t>(256, tree_.size() / 64);
     const auto starts = first.prepare(static_cast<std::uint32_t>(share));
     std::vector<detail::WalkCount> counts(starts.size());
     parallelForTasks(starts.size(), [&](std::size_t i) {
-      Walk walk(tree_, moments, limits, softening_sq, fields_);
+      Walk walk(tree_, moments, images_.shifts(), limits, softening_sq, fields_);
       walk.run(starts[i]);
       counts[i] = walk.count();
     });
     count_ = first.count();
     for (const detail::WalkCount& part : counts) {
       count_ += part;
+    }
+    if (!images_.isOpen()) {
+      farImages_.addTo(tree_.size(), tree_.x.data(), tree_.y.data(), tree_.z.data(), fields_.ax.data(),
+                       fields_.ay.data(), fields_.az.data(),
+                       fields_.potential.empty() ? nullptr : fields_.potential.data());
     }
   }
 
@@ -125,7 +147,7 @@ class FastMultipole {
     const std::size_t n = positions.size();
     tree_.resize(n);
     parallelFor(n, 4096, [&](std::size_t i) {
-      const Vector3<S> x = positions[i] * units_.perLength();
+      const Vector3<S> x = images_.home(positions[i]) * units_.perLength();
       tree_.x[i] = x[0];
       tree_.y[i] = x[1];
       tree_.z[i] = x[2];
@@ -136,6 +158,8 @@ class FastMultipole {
 
   S tolerance_ = S(1e-5);
   detail::GravityUnits<S> units_;
+  detail::PeriodicImages<S, F> images_;
+  detail::ImageField<S, F> farImages_;
   detail::BodyTree<S, F> tree_;
   detail::TreeMoments<S, F, detail::HarmonicTerms> moments_;
   detail::TreeMoments<S, F, detail::AllTerms> softMoments_;

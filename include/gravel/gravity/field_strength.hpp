@@ -4,17 +4,22 @@
 /// A first look at the field: how strong it is where the bodies of each cell are, within a few ten per cent.
 
 #include <gravel/gravity/body_tree.hpp>
+#include <gravel/gravity/image_field.hpp>
 
 namespace gravel::detail {
 
 /// Sets each cell's weight to share / sqrt(mean of 1/a^2) over its bodies, a the acceleration (G = 1) that
-/// groups of at most `groupSize` bodies feel at their centre from other cells as points. An error of that
-/// size at all of them has a relative rms of `share`. Accelerations below a thousandth of the mean count as
-/// that much. Needs the geometry of TreeMoments. About 100 pairs of cells a group.
+/// groups of at most `groupSize` bodies feel at their centre from other cells, and images of cells, as
+/// points. An error of that size at all of them has a relative rms of `share`. Accelerations below a
+/// thousandth of the mean count as that much; in a periodic system, where they may cancel everywhere, the
+/// mean counts as at least a tenth of the pull of one body at the mean distance. Needs the geometry of
+/// TreeMoments. About 100 pairs of cells a group.
 template <Real S, Real F>
 class FieldStrength {
  public:
-  void compute(BodyTree<S, F>& tree, const F& share) {
+  /// \param field of the far images, which have been gathered unless `images` is open
+  void compute(BodyTree<S, F>& tree, const F& share, const PeriodicImages<S, F>& images,
+               const ImageField<S, F>& field) {
     const std::size_t n = tree.cells.size();
     groups_.clear();
     isBelow_.assign(n, 0);
@@ -32,7 +37,15 @@ class FieldStrength {
     parallelForChunks(groups_.size(), 64, [&](std::size_t begin, std::size_t end) {
       std::vector<std::uint32_t> todo;
       for (std::size_t g = begin; g < end; ++g) {
-        strength_[g] = fieldAt(tree, tree.cells[groups_[g]], todo);
+        const TreeCell<F>& group = tree.cells[groups_[g]];
+        Vector3<F> a = Vector3<F>::Zero();
+        for (const Vector3<S>& shift : images.shifts()) {
+          addField(tree, group, Vector3<F>(F(shift[0]), F(shift[1]), F(shift[2])), todo, a);
+        }
+        if (!images.isOpen()) {
+          a += field.at(group.centre);
+        }
+        strength_[g] = F(a.norm());
       }
     });
     F mean(0);
@@ -40,20 +53,32 @@ class FieldStrength {
       mean += F(static_cast<double>(tree.cells[groups_[g]].count())) * strength_[g];
     }
     mean = mean / F(static_cast<double>(tree.size()));
+    if (!images.isOpen()) {
+      mean = std::max<F>(mean, F(0.1) * pullAtMeanDistance(tree));
+    }
     shareOut(tree, share, F(mean * F(1e-3)));
   }
 
  private:
   static constexpr std::uint32_t groupSize = 64;
 
-  static F fieldAt(const BodyTree<S, F>& tree, const TreeCell<F>& group, std::vector<std::uint32_t>& todo) {
+  /// Of a body of mean mass, bodies taken to fill the sphere around the root.
+  static F pullAtMeanDistance(const BodyTree<S, F>& tree) {
+    const TreeCell<F>& root = tree.cells[0];
+    const double n = static_cast<double>(tree.size());
+    const F r = F(root.radius);
+    return r > F(0) ? F(root.mass / (r * r) * F(std::cbrt(1 / n))) : F(0);
+  }
+
+  /// Adds to `sum` what an image of all cells does to a group.
+  static void addField(const BodyTree<S, F>& tree, const TreeCell<F>& group, const Vector3<F>& shift,
+                       std::vector<std::uint32_t>& todo, Vector3<F>& sum) {
     using std::sqrt;
-    Vector3<F> sum = Vector3<F>::Zero();
     todo.assign(1, 0);
     while (!todo.empty()) {
       const TreeCell<F>& source = tree.cells[todo.back()];
       todo.pop_back();
-      const Vector3<F> d = source.centre - group.centre;
+      const Vector3<F> d = (source.centre - group.centre) + shift;
       const F r_sq = d.squaredNorm();
       const F own = F(source.radius) * F(source.radius);
       const bool isFar = r_sq > F(1.5) * own;
@@ -69,7 +94,6 @@ class FieldStrength {
         }
       }
     }
-    return F(sum.norm());
   }
 
   void shareOut(BodyTree<S, F>& tree, const F& share, const F& least) {

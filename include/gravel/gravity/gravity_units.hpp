@@ -17,8 +17,10 @@ class GravityUnits {
 
   /// \throws std::invalid_argument for values that are not finite, negative masses or softening, and columns
   /// of different lengths
+  /// \param box edges of a periodic system [m]; 0 along axes that are open
   template <class Positions, class Masses>
-  GravityUnits(const Positions& positions, const Masses& masses, const S& G, const S& softening) {
+  GravityUnits(const Positions& positions, const Masses& masses, const S& G, const S& softening,
+               const Vector3<S>& box = Vector3<S>::Zero()) {
     const std::size_t n = positions.size();
     require("G", G, anyFinite<S>());
     require("softening", softening, nonNegative<S>());
@@ -39,7 +41,13 @@ class GravityUnits {
       heaviest = std::max(heaviest, m);
       sources_ += m > S(0) ? 1U : 0U;
     }
-    const S extent = std::max(S((high - low).maxCoeff()), softening);
+    low_ = low[2] * S(2);
+    high_ = high[2] * S(2);
+    S extent = softening;
+    for (int axis = 0; axis < 3; ++axis) {
+      const S half = box[axis] > S(0) ? S(box[axis] / S(2)) : S(high[axis] - low[axis]);
+      extent = std::max(extent, half);
+    }
     lengthExponent_ = exponentOf(extent);
     massExponent_ = exponentOf(heaviest);
     perLength_ = power(-lengthExponent_);
@@ -49,6 +57,8 @@ class GravityUnits {
   const S& perLength() const { return perLength_; }
   const S& perMass() const { return perMass_; }
   std::size_t sources() const { return sources_; }  ///< bodies with mass
+  const S& low() const { return low_; }             ///< least and greatest z [m]
+  const S& high() const { return high_; }
 
   /// x -> x G in the units of the caller, out of range only if the result is.
   class Factor {
@@ -105,6 +115,8 @@ class GravityUnits {
   S perLength_ = S(1);
   S perMass_ = S(1);
   std::size_t sources_ = 0;
+  S low_ = S(0);
+  S high_ = S(0);
 };
 
 }  // namespace gravel::detail

@@ -38,20 +38,22 @@ class MultipoleWalk {
   using Tree = BodyTree<S, F>;
   using Moments = TreeMoments<S, F, Terms>;
 
-  MultipoleWalk(const Tree& tree, const Moments& moments, const WalkLimits& limits, const S& softening_sq,
-                SinkFields<S>& out)
+  /// \param shifts of the images that are sources, first that of the cells themselves, zero
+  MultipoleWalk(const Tree& tree, const Moments& moments, const std::vector<Vector3<S>>& shifts,
+                const WalkLimits& limits, const S& softening_sq, SinkFields<S>& out)
       : tree_(tree),
+        shifts_(shifts),
         limits_(limits),
         softening_sq_(softening_sq),
         out_(out),
-        far_(tree, moments, limits.order, out.potential.empty() ? 1 : 0, softening_sq) {}
+        far_(tree, moments, shifts, limits.order, out.potential.empty() ? 1 : 0, softening_sq) {}
 
   /// Where a walk can be taken up again: a cell, what its parent left it of the local expansion, and the
   /// sources that it has to meet.
   struct Start {
     std::uint32_t cell = 0;
     std::vector<F> local;
-    std::vector<std::uint32_t> sources;
+    std::vector<ImageCell> sources;
   };
 
   /// Descends to cells of at most `bodies` bodies and returns these as starts.
@@ -59,7 +61,11 @@ class MultipoleWalk {
     std::vector<Start> starts;
     prepared_ = &starts;
     handOver_ = bodies;
-    run({0, std::vector<F>(far_.terms(), F(0)), {0}});
+    Start all{0, std::vector<F>(far_.terms(), F(0)), {}};
+    for (std::uint32_t image = 0; image < shifts_.size(); ++image) {
+      all.sources.push_back({0, image});
+    }
+    run(all);
     prepared_ = nullptr;
     return starts;
   }
@@ -90,7 +96,7 @@ class MultipoleWalk {
     for (std::size_t i = begin; i < end; ++i) {
       todo_.push_back(stack_[i]);
       while (!todo_.empty()) {
-        const std::uint32_t source = todo_.back();
+        const ImageCell source = todo_.back();
         todo_.pop_back();
         meet(c, source);
       }
@@ -118,18 +124,19 @@ class MultipoleWalk {
     return v.begin() + static_cast<std::ptrdiff_t>(i);
   }
 
-  void meet(std::uint32_t c, std::uint32_t s) {
+  void meet(std::uint32_t c, const ImageCell& from) {
+    const std::uint32_t s = from.cell;
     const Cell& sink = tree_.cells[c];
     const Cell& source = tree_.cells[s];
     if (!(source.mass > F(0))) {
       return;
     }
-    if (c == s) {
+    if (c == s && from.image == 0) {
       if (sink.isLeaf()) {
         near_.addWithin(tree_, sink.first, sink.last, softening_sq_, out_);
       } else {
         for (std::uint32_t child = 0; child < sink.children; ++child) {
-          stack_.push_back(sink.child + child);
+          stack_.push_back({sink.child + child, 0});
         }
       }
       return;
@@ -138,18 +145,28 @@ class MultipoleWalk {
     const std::uint64_t pairs = std::uint64_t(sink.count()) * source.count();
     // NOLINTNEXTLINE(bugprone-branch-clone): the order counts, the cheap test before the dear one
     if (pairs <= limits_.pairsBelowExpansion) {
-      near_.addSources(tree_, source.first, source.last);
-    } else if (c < s ? isFar(sink, source) : isFar(source, sink)) {
-      far_.add(sink, s);
+      addNear(source, from.image);
+    } else if (isFar(sink, source, from.image)) {
+      far_.add(sink, from);
       ++count_.expansions;
     } else if (pairs <= limits_.pairsBelowSplit || (sink.isLeaf() && source.isLeaf())) {
-      near_.addSources(tree_, source.first, source.last);
-    } else if (splitsFirst(c, sink, s, source)) {
-      stack_.push_back(s);
+      addNear(source, from.image);
+    } else if (c != s && splitsFirst(c, sink, s, source)) {
+      stack_.push_back(from);
     } else {
+      // A cell and its own image are both divided, as each is the image of the other.
+      std::vector<ImageCell>& next = c == s ? stack_ : todo_;
       for (std::uint32_t child = 0; child < source.children; ++child) {
-        todo_.push_back(source.child + child);
+        next.push_back({source.child + child, from.image});
       }
+    }
+  }
+
+  void addNear(const Cell& source, std::uint32_t image) {
+    if (image == 0) {
+      near_.addSources(tree_, source.first, source.last);
+    } else {
+      near_.addSources(tree_, source.first, source.last, shifts_[image]);
     }
   }
 
@@ -160,8 +177,14 @@ class MultipoleWalk {
     return cellA.radius == cellB.radius ? a < b : cellA.radius > cellB.radius;
   }
 
-  bool isFar(const Cell& a, const Cell& b) const {
-    const F r_sq = (a.centre - b.centre).squaredNorm();
+  /// The same bits for a pair of cells seen from either: images come in pairs of opposite shifts.
+  bool isFar(const Cell& a, const Cell& b, std::uint32_t image) const {
+    Vector3<F> r = a.centre - b.centre;
+    if (image != 0) {
+      const Vector3<S>& shift = shifts_[image];
+      r -= Vector3<F>(F(shift[0]), F(shift[1]), F(shift[2]));
+    }
+    const F r_sq = r.squaredNorm();
     const F both = F(a.radius) + F(b.radius);
     const F gap = r_sq - both * both;
     return gap > F(0) && isAccurate(a, b, r_sq, gap) && isAccurate(b, a, r_sq, gap);
@@ -181,11 +204,12 @@ class MultipoleWalk {
   }
 
   const Tree& tree_;
+  const std::vector<Vector3<S>>& shifts_;
   WalkLimits limits_;
   S softening_sq_;
   SinkFields<S>& out_;
-  std::vector<std::uint32_t> stack_;  ///< sources that cells on the path have left to their children
-  std::vector<std::uint32_t> todo_;
+  std::vector<ImageCell> stack_;  ///< sources that cells on the path have left to their children
+  std::vector<ImageCell> todo_;
   std::vector<F> locals_;  ///< of the cells on the path and their siblings
   FarField<S, F, Terms> far_;
   NearField<S> near_;

@@ -31,17 +31,15 @@ class NearField {
 
   template <class Tree>
   void addSources(const Tree& tree, std::uint32_t first, std::uint32_t last) {
-    const std::size_t n = last - first;
-    reserve(count_ + n + width);
-    const std::vector<S>* from[4] = {&tree.x, &tree.y, &tree.z, &tree.m};
-    for (std::size_t column = 0; column < 4; ++column) {
-      const S* source = from[column]->data() + first;
-      S* to = columns_[column].data() + count_;
-      for (std::size_t i = 0; i < n; i += width) {  // whole tiles: the tree's columns go on behind their end
-        Tile::store(to + i, Tile::load(source + i));
-      }
-    }
-    count_ += n;
+    append(tree, first, last, [](std::size_t, const T& tile) { return tile; });
+  }
+
+  /// An image of them.
+  template <class Tree>
+  void addSources(const Tree& tree, std::uint32_t first, std::uint32_t last, const Vector3<S>& shift) {
+    append(tree, first, last, [&](std::size_t column, const T& tile) {
+      return column < 3 ? T(tile + shift[static_cast<Eigen::Index>(column)]) : tile;
+    });
   }
 
   template <class Tree>
@@ -94,6 +92,21 @@ class NearField {
   using Tile = GravityTile<S>;
   using T = typename Tile::Type;
   static constexpr auto width = static_cast<std::size_t>(Tile::width);
+
+  template <class Tree, class Move>
+  void append(const Tree& tree, std::uint32_t first, std::uint32_t last, Move&& move) {
+    const std::size_t n = last - first;
+    reserve(count_ + n + width);
+    const std::vector<S>* from[4] = {&tree.x, &tree.y, &tree.z, &tree.m};
+    for (std::size_t column = 0; column < 4; ++column) {
+      const S* source = from[column]->data() + first;
+      S* to = columns_[column].data() + count_;
+      for (std::size_t i = 0; i < n; i += width) {  // whole tiles: the tree's columns go on behind their end
+        Tile::store(to + i, move(column, Tile::load(source + i)));
+      }
+    }
+    count_ += n;
+  }
 
   void reserve(std::size_t n) {
     const std::size_t rows = (n + width - 1) / width * width;

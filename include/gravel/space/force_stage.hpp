@@ -27,11 +27,12 @@ class ForceStage {
   bool hasTorques() const { return static_cast<bool>(hook); }
 
   /// Sets force, torque, acceleration and angular acceleration of every body at the present positions.
-  void evaluate(Bodies<Scalar, Layout>& bodies, const Scalar& G, const Scalar& softening, const Scalar& time,
-                Profiler& profiler) {
+  void evaluate(Bodies<Scalar, Layout>& bodies, const Scalar& G, const Scalar& softening,
+                const Domain<Scalar>& domain, const Scalar& time, Profiler& profiler) {
     const std::size_t n = bodies.size();
     const char* reason = reasonToSkip(bodies, G);
     if (reason == nullptr) {
+      gravity.setDomain(domain, time);
       const Profiler::Scope scope(profiler, Phase::Gravity);
       profiler.method(Phase::Gravity, gravity.name(n));
       gravity.accelerations(bodies.positions(), bodies.masses(), G, softening, bodies.accelerations());
@@ -57,10 +58,14 @@ class ForceStage {
     }
   }
 
-  /// Mutual gravity and the field [J]. O(N^2) by the direct sum, O(N) by expansions, with their error.
-  Scalar potentialEnergy(const Bodies<Scalar, Layout>& bodies, const Scalar& G, const Scalar& softening) {
+  /// Mutual gravity, with that of images, and the field [J]. O(N^2) by the direct sum, O(N) by expansions,
+  /// with their error.
+  Scalar potentialEnergy(const Bodies<Scalar, Layout>& bodies, const Scalar& G, const Scalar& softening,
+                         const Domain<Scalar>& domain, const Scalar& time) {
     Scalar energy(0);
-    if (reasonToSkip(bodies, G) == nullptr) {
+    const bool ownImages = bodies.size() == 1 && !domain.isOpen();
+    if (reasonToSkip(bodies, G) == nullptr || ownImages) {
+      gravity.setDomain(domain, time);
       energy += gravity.potentialEnergy(bodies.positions(), bodies.masses(), G, softening);
     }
     if (!(field.squaredNorm() == Scalar(0))) {

@@ -102,9 +102,9 @@ class Space : public Settings<Scalar> {
   void setCollisionHook(CollisionHook<Scalar> hook) { contact_.collisionHook = std::move(hook); }
   /// Open, periodic or shear-periodic. A shear-periodic one is a patch of a disc in Hill's frame: positions,
   /// velocities and spins are those in the frame, its potential is part of the potential energy, and the
-  /// shear does its `work` where bodies or contacts cross an edge in x. \throws std::invalid_argument for a
-  /// domain that is not open with gravity (G > 0), and for a shear-periodic one unless config.integrator is
-  /// SymplecticEpicycle
+  /// shear does its `work` where bodies or contacts cross an edge in x. With gravity the images of all bodies
+  /// pull: see DirectSum::setDomain. What the shear does to gravity across an edge is not in the ledger.
+  /// \throws std::invalid_argument for a shear-periodic domain unless config.integrator is SymplecticEpicycle
   void setDomain(const Domain<Scalar>& domain);
   const Domain<Scalar>& domain() const { return contact_.domain; }
 
@@ -215,15 +215,15 @@ class Space : public Settings<Scalar> {
   void rememberPlaces();
   bool placesChanged() const;
   Material<Scalar> pairMaterial(const CollisionContext& ctx) const;
-  Scalar bindingEnergy(std::size_t i) const;
+  Scalar bindingEnergy(std::size_t i, const Scalar& time) const;
   std::vector<std::pair<BodyId, BodyId>> decideCollisions();
   void mergeCollided(const std::vector<std::pair<BodyId, BodyId>>& merges);
   void merge(BodyId stays, BodyId goes);
-  Scalar pairEnergy(std::size_t i, std::size_t j) const;
+  Scalar pairEnergy(std::size_t i, std::size_t j, const Scalar& time) const;
   Scalar potentialEnergy() const;
   template <class Change>
   void changePotential(Change&& change);
-  void checkGravityInDomain(const Scalar& G, const Domain<Scalar>& domain) const;
+  void checkIntegratorIn(const Domain<Scalar>& domain) const;
   void logLine(const char* line) const;
 
   Bodies bodies_;

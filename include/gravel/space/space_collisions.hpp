@@ -85,9 +85,10 @@ void Space<Scalar, Layout>::merge(BodyId stays, BodyId goes) {
   const Body<Scalar> b = bodies_[j].load();
   Vector r_ab = b.position - a.position;
   Vector v_ab = b.velocity - a.velocity;
-  contact_.domain.minimumImage(r_ab, v_ab, Scalar(time_ + previous_dt_));
+  const Scalar time = time_ + previous_dt_;
+  contact_.domain.minimumImage(r_ab, v_ab, time);
   const Scalar motion = motionOf(i) + motionOf(j);
-  const Scalar energy = bindingEnergy(i) + bindingEnergy(j) - pairEnergy(i, j);
+  const Scalar energy = bindingEnergy(i, time) + bindingEnergy(j, time) - pairEnergy(i, j, time);
   const Vector pull = Vector(bodies_[i].force()) + Vector(bodies_[j].force());
   const Body<Scalar> one = merged(a, b, r_ab, v_ab);
   bodies_[i].store(one);
@@ -99,7 +100,7 @@ void Space<Scalar, Layout>::merge(BodyId stays, BodyId goes) {
   const std::size_t now = bodies_.indexOf(stays);
   const Scalar lost = motion - motionOf(now);
   left_.restitution += lost;
-  left_.exchange += energy - bindingEnergy(now) - lost;  // of the potential
+  left_.exchange += energy - bindingEnergy(now, time) - lost;  // of the potential
 }
 
 }  // namespace gravel

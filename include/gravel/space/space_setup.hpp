@@ -50,7 +50,7 @@ BodyId Space<Scalar, Layout>::addBody(const Body<Scalar>& body) {
   const BodyId id = bodies_.add(body);
   forcesValid_ = false;
   if (ledgerOpen_) {
-    left_.exchange -= bindingEnergy(n() - 1);
+    left_.exchange -= bindingEnergy(n() - 1, time_);
   }
   return id;
 }
@@ -59,7 +59,7 @@ template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::removeBody(BodyId id) {
   const std::size_t i = bodies_.indexOf(id);
   if (ledgerOpen_) {
-    left_.exchange += bindingEnergy(i);
+    left_.exchange += bindingEnergy(i, time_);
   }
   bodies_.remove(id);
   forcesValid_ = false;
@@ -123,23 +123,20 @@ void Space<Scalar, Layout>::setForceHook(ForceHook<Scalar, Layout> hook) {
 }
 
 template <Real Scalar, class Layout>
-void Space<Scalar, Layout>::checkGravityInDomain(const Scalar& G, const Domain<Scalar>& domain) const {
+void Space<Scalar, Layout>::checkIntegratorIn(const Domain<Scalar>& domain) const {
   if (domain.kind() == DomainKind::ShearPeriodic &&
       this->config_.integrator != IntegratorKind::SymplecticEpicycle) {
     detail::refuse("domain", "shear-periodic",
                    std::string("open or periodic with the integrator ") +
                        traitsOf(this->config_.integrator).name + "; shear-periodic with SymplecticEpicycle");
   }
-  if (!domain.isOpen() && !(G == Scalar(0))) {
-    detail::refuse("G in a periodic domain", detail::formatReal(G),
-                   "0: gravity sums over an open domain only");
-  }
 }
 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::setDomain(const Domain<Scalar>& domain) {
-  checkGravityInDomain(getG(), domain);
-  if (HillFrame<Scalar>(domain).turns() || HillFrame<Scalar>(contact_.domain).turns()) {
+  checkIntegratorIn(domain);
+  const bool turns = HillFrame<Scalar>(domain).turns() || HillFrame<Scalar>(contact_.domain).turns();
+  if (turns || !(getG() == Scalar(0))) {
     changePotential([&] { contact_.domain = domain; });
   } else {
     contact_.domain = domain;
@@ -151,7 +148,6 @@ void Space<Scalar, Layout>::setG(Scalar g) {
   SimulationConfig<Scalar> next = this->config_;
   next.G = g;
   next.validate();
-  checkGravityInDomain(g, contact_.domain);
   changePotential([&] { this->config_.G = g; });
 }
 
@@ -173,19 +169,21 @@ void Space<Scalar, Layout>::changePotential(Change&& change) {
   forcesValid_ = false;
 }
 
-/// Potential energy of a pair [J].
+/// Potential energy of a pair [J], with that of their images but without that of each and its own.
 template <Real Scalar, class Layout>
-Scalar Space<Scalar, Layout>::pairEnergy(std::size_t i, std::size_t j) const {
-  const Vector r_ij = Vector(bodies_[j].position()) - Vector(bodies_[i].position());
-  const Scalar s = r_ij.squaredNorm() + this->config_.softening * this->config_.softening;
-  return getG() == Scalar(0) ? Scalar(0)
-                             : Scalar(-getG() * Scalar(bodies_[i].mass()) * Scalar(bodies_[j].mass()) *
-                                      PairLaw<Scalar>::potentialFactor(s));
+Scalar Space<Scalar, Layout>::pairEnergy(std::size_t i, std::size_t j, const Scalar& time) const {
+  const std::array<Vector, 2> x{bodies_[i].position(), bodies_[j].position()};
+  const std::array<Scalar, 2> m{bodies_[i].mass(), bodies_[j].mass()};
+  const std::array<Scalar, 2> alone{m[0], Scalar(0)};
+  force_.gravity.setDomain(contact_.domain, time);
+  const Scalar& softening = this->config_.softening;
+  return force_.gravity.energyOf(0, x, m, getG(), softening) -
+         force_.gravity.energyOf(0, x, alone, getG(), softening);
 }
 
 /// Kinetic energy of body i and its share of the potential: what leaves with it. O(N).
 template <Real Scalar, class Layout>
-Scalar Space<Scalar, Layout>::bindingEnergy(std::size_t i) const {
+Scalar Space<Scalar, Layout>::bindingEnergy(std::size_t i, const Scalar& time) const {
   const auto one = bodies_[i];
   const Scalar m = one.mass();
   const Vector x = one.position();
@@ -195,10 +193,9 @@ Scalar Space<Scalar, Layout>::bindingEnergy(std::size_t i) const {
   if (!one.isFixed()) {
     energy += m * (HillFrame<Scalar>(contact_.domain).potential(x) - force_.field.dot(x));
   }
-  for (std::size_t j = 0; j < n() && !(getG() == Scalar(0)) && m > Scalar(0); ++j) {
-    energy += j == i ? Scalar(0) : pairEnergy(i, j);
-  }
-  return energy;
+  force_.gravity.setDomain(contact_.domain, time);
+  return energy +
+         force_.gravity.energyOf(i, bodies_.positions(), bodies_.masses(), getG(), this->config_.softening);
 }
 
 }  // namespace gravel

@@ -12,7 +12,7 @@ namespace gravel {
 template <Real Scalar, class Layout>
 Scalar Space<Scalar, Layout>::potentialEnergy() const {
   const HillFrame<Scalar> frame(contact_.domain);
-  return force_.potentialEnergy(bodies_, getG(), this->config_.softening) +
+  return force_.potentialEnergy(bodies_, getG(), this->config_.softening, contact_.domain, time_) +
          (frame.turns() ? frameEnergy(bodies_, frame) : Scalar(0));
 }
 

@@ -76,7 +76,8 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration) {
     ledgerOpen_ = true;
     previous_dt_ = h;
     const auto forces = [&](const Scalar& passed) {
-      force_.evaluate(bodies_, getG(), this->config_.softening, Scalar(time_ + passed), profiler_);
+      force_.evaluate(bodies_, getG(), this->config_.softening, contact_.domain, Scalar(time_ + passed),
+                      profiler_);
     };
     contact_.beginStep();
     const Departure departure{this, h};
@@ -187,7 +188,7 @@ bool Space<Scalar, Layout>::placesChanged() const {
 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::applyGravity() {
-  force_.evaluate(bodies_, getG(), this->config_.softening, time_, profiler_);
+  force_.evaluate(bodies_, getG(), this->config_.softening, contact_.domain, time_, profiler_);
 }
 
 template <Real Scalar, class Layout>
@@ -231,7 +232,8 @@ void Space<Scalar, Layout>::updateAdaptiveTimeStep() {
     wanted = stepFromMotion(bodies_, c.softening, limits, !contact_.boundaries.empty());
   }
   if (pulls) {
-    wanted = std::min<Scalar>(wanted, stepFromEncounters(bodies_, getG(), c.softening, limits));
+    wanted = std::min<Scalar>(
+        wanted, stepFromEncounters(bodies_, getG(), c.softening, limits, contact_.domain.isOpen()));
   }
   // A blow, or a change from outside, ends one smooth motion and begins another.
   dt_ =
