@@ -237,21 +237,23 @@ TEMPLATE_LIST_TEST_CASE("bodies: validateAll finds what was written past the doo
   using S = typename TestType::Scalar;
   constexpr S nan = std::numeric_limits<S>::quiet_NaN();
   TestType c;
-  for (int k = 0; k < 5; ++k) {
+  for (int k = 0; k < 7; ++k) {
     c.bodies.add(sampleBody<S>(k + 1));
   }
   c.bodies.remove(BodyId{0});  // so that index and id differ
   CHECK_NOTHROW(c.bodies.validateAll());
   const auto found = [&](const char* field, auto change) {
-    const auto body = c.bodies[c.bodies.indexOf(BodyId{4})];
-    const Body<S> good = body.load();
-    change(body);
-    const std::string message =
-        messageOf<std::invalid_argument>([&] { std::as_const(c.bodies).validateAll(); });
-    INFO(message);
-    CHECK(message.find(std::string("gravel: ") + field + " of body 4 is ") == 0);
-    body.store(good);
-    CHECK_NOTHROW(c.bodies.validateAll());
+    for (std::uint64_t id = 1; id < 7; ++id) {  // each place in a tile of four, and behind it
+      const auto body = c.bodies[c.bodies.indexOf(BodyId{id})];
+      const Body<S> good = body.load();
+      change(body);
+      const std::string message =
+          messageOf<std::invalid_argument>([&] { std::as_const(c.bodies).validateAll(); });
+      INFO(message);
+      CHECK(message.find("gravel: " + std::string(field) + " of body " + std::to_string(id) + " is ") == 0);
+      body.store(good);
+      CHECK_NOTHROW(c.bodies.validateAll());
+    }
   };
   found("position", [&](auto b) { b.position().z() = nan; });
   found("velocity", [&](auto b) { b.velocity().x() = std::numeric_limits<S>::infinity(); });
@@ -264,7 +266,7 @@ TEMPLATE_LIST_TEST_CASE("bodies: validateAll finds what was written past the doo
   found("radius", [&](auto b) { b.radius() = S(-1); });
   found("radius", [&](auto b) { b.radius() = nan; });
   const auto factor = [&](const S& k) {
-    return [&c, k](auto) { c.bodies.inertiaFactors()[c.bodies.indexOf(BodyId{4})] = k; };
+    return [&c, k](auto b) { c.bodies.inertiaFactors()[b.index()] = k; };
   };
   found("inertia", factor(nan));
   found("inertia", factor(S(-1)));

@@ -132,3 +132,44 @@ TEST_CASE("lanes: a tile is a cache line of the built-in scalars, and tiles cove
     }
   }
 }
+
+namespace {
+
+/// Keeps the processor busy, as a sleep this short cannot.
+void spin(double seconds) {
+  const auto start = Clock::now();
+  while (std::chrono::duration<double>(Clock::now() - start).count() < seconds) {
+  }
+}
+
+}  // namespace
+
+// Seen to fail: a timed step that counts for one.
+TEST_CASE("profiler: of short steps some are timed and count for all, long ones are all timed",
+          "[profiler]") {
+  Profiler profiler;
+  const auto start = Clock::now();
+  for (int k = 0; k < 3200; ++k) {
+    const Profiler::Step step(profiler);
+    const Profiler::Scope scope(profiler, Phase::Gravity);
+    spin(2e-6);
+  }
+  const double passed = std::chrono::duration<double>(Clock::now() - start).count();
+  CHECK(profiler.entry(Phase::Gravity).calls == 3200);
+  CHECK(profiler.entry(Phase::Gravity).seconds > 3200 * 2e-6 * 0.98);
+  CHECK(profiler.entry(Phase::Gravity).seconds < 16 * passed);  // one of them may have been interrupted
+
+  profiler.reset();
+  for (int k = 0; k < 20 + 16; ++k) {
+    const Profiler::Step step(profiler);
+    const Profiler::Scope scope(profiler, Phase::Damping);
+    busy(1);
+  }
+  CHECK(profiler.entry(Phase::Damping).seconds >= 0.036 - 0.016);  // up to 16 steps were not timed yet
+  // Outside steps everything is timed.
+  {
+    const Profiler::Scope scope(profiler, Phase::Colouring);
+    busy(2);
+  }
+  CHECK(profiler.entry(Phase::Colouring).seconds >= 0.002);
+}

@@ -132,8 +132,8 @@ TEST_CASE("A position or velocity written from outside begins anew, without what
     advance(bodies, lost);
   }
   REQUIRE(lost.size() == 1);
-  CHECK(lost[0].position.low.norm() > 0.0);
-  CHECK(lost[0].velocity.low.norm() > 0.0);
+  CHECK(lost[0].position.low(bodies[0].position()).norm() > 0.0);
+  CHECK(lost[0].velocity.low(bodies[0].velocity()).norm() > 0.0);
   const std::vector<double> before = lost.lostParts(bodies);
   CHECK(before.size() == 6);
 
@@ -167,7 +167,7 @@ TEST_CASE("What is carried is below half an ulp, and is what makes the sum whole
     for (int k = 0; k < 3; ++k) {
       const double ulp =
           std::nextafter(std::abs(bodies[0].position()[k]), 10.0) - std::abs(bodies[0].position()[k]);
-      worst = std::max(worst, std::abs(lost[0].position.low[k]) / ulp);
+      worst = std::max(worst, std::abs(lost[0].position.low(bodies[0].position())[k]) / ulp);
     }
   }
   CHECK(worst <= 0.5);
@@ -183,4 +183,52 @@ TEST_CASE("What is carried is below half an ulp, and is what makes the sum whole
   };
   CAPTURE(off(bodies), off(plain));
   CHECK(off(bodies) < off(plain));
+}
+
+// Columns are taken four bodies at a time, other layouts one by one. Seen to fail: lost parts that are kept
+// where somebody wrote; a turn that looks at the first body of four alone.
+TEMPLATE_TEST_CASE("Tiles of bodies get the bits that single bodies get, fixed and turning ones among them",
+                   "", float, double) {
+  using S = TestType;
+  for (const std::size_t n : {1U, 3U, 4U, 5U, 8U, 11U}) {
+    const auto endOf = [n](auto layout, bool carried) {
+      Bodies<S, decltype(layout)> bodies;
+      const CounterRandom random(5);
+      for (std::size_t i = 0; i < n; ++i) {
+        Body<S> body;
+        body.position = random.direction(10 * i).template cast<S>();
+        body.velocity = random.direction(10 * i + 3).template cast<S>();
+        body.fixed = i == 6;
+        if (i % 3 == 1) {
+          body.angularVelocity = random.direction(10 * i + 6).template cast<S>();
+        }
+        bodies.add(body);
+      }
+      Compensation<S> lost;
+      const auto forces = [&](const S&) { SpringForce{}(bodies); };
+      forces(S(0));
+      for (int step = 0; step < 20; ++step) {
+        integrate(
+            IntegratorKind::Yoshida4, bodies, S(0.03), true, forces, [] {}, NoDeparture{},
+            carried ? &lost : nullptr);
+        if (step == 10) {
+          bodies[n / 2].velocity() *= S(0.7);
+          bodies[n - 1].position()[1] += S(0.1);
+          bodies[n - 1].angularAcceleration() = Vector3<S>(S(0.1), S(0), S(0.2));
+        }
+      }
+      std::vector<S> state = lost.lostParts(bodies);
+      for (std::size_t i = 0; i < n; ++i) {
+        for (int c = 0; c < 3; ++c) {
+          state.insert(state.end(), {bodies[i].position()[c], bodies[i].velocity()[c],
+                                     bodies[i].angularVelocity()[c], bodies[i].orientation().coeffs()[c]});
+        }
+      }
+      return state;
+    };
+    for (const bool carried : {false, true}) {
+      CAPTURE(n, carried);
+      CHECK(endOf(SoA{}, carried) == endOf(AoS{}, carried));
+    }
+  }
 }

@@ -3,6 +3,7 @@
 /// \file
 /// The container of bodies: a storage, stable ids, and the checks at the door.
 
+#include <gravel/bodies/columns.hpp>
 #include <gravel/bodies/proxy.hpp>
 #include <gravel/core/parallel.hpp>
 
@@ -188,21 +189,10 @@ class Bodies {
   /// Looks at every body: the guard against values written through proxies or by a user's own code.
   /// \throws std::invalid_argument naming body, field, value and what is allowed
   void validateAll() const {
-    parallelFor(size(), 4096, [&](std::size_t i) {
-      const auto body = (*this)[i];
-      const Scalar m = body.mass();
-      const Scalar r = body.radius();
-      const Scalar k = storage_.at(fields::InertiaFactor{}, i);
-      const Scalar q_sq = body.orientation().squaredNorm();
-      const bool good = isFinite(body.position()) && isFinite(body.velocity()) &&
-                        isFinite(body.angularVelocity()) && isFinite(m) && isFinite(r) && m >= Scalar(0) &&
-                        r >= Scalar(0) && (m > Scalar(0) || r == Scalar(0) || body.isFixed()) &&
-                        isFinite(q_sq) && q_sq > Scalar(0) && isFinite(k) && k > Scalar(0);
-      if (!good) {
-        const std::string who = "body " + std::to_string(toInteger(body.id()));
-        validate(body.load(), who);
-        checkFactor(k, who);
-      }
+    parallelForChunks(size(), 4096, [&](std::size_t begin, std::size_t end) {
+      detail::forTilesOrBodies(
+          storage_, begin, end, [&](std::size_t i) { validateTile(i, end); },
+          [&](std::size_t i) { validateOne(i); });
     });
   }
 
@@ -235,6 +225,51 @@ class Bodies {
   auto flags() const { return Column<const Storage, fields::Flags>(storage_); }
 
  private:
+  void validateOne(std::size_t i) const {
+    const auto body = (*this)[i];
+    const Scalar m = body.mass();
+    const Scalar r = body.radius();
+    const Scalar k = storage_.at(fields::InertiaFactor{}, i);
+    const Scalar q_sq = body.orientation().squaredNorm();
+    const bool good = isFinite(body.position()) && isFinite(body.velocity()) &&
+                      isFinite(body.angularVelocity()) && isFinite(m) && isFinite(r) && m >= Scalar(0) &&
+                      r >= Scalar(0) && (m > Scalar(0) || r == Scalar(0) || body.isFixed()) &&
+                      isFinite(q_sq) && q_sq > Scalar(0) && isFinite(k) && k > Scalar(0);
+    if (!good) {
+      const std::string who = "body " + std::to_string(toInteger(body.id()));
+      validate(body.load(), who);
+      checkFactor(k, who);
+    }
+  }
+
+  /// The same for a tile of movable bodies; those from `end` on are none.
+  void validateTile(std::size_t i, std::size_t end) const {
+    if constexpr (detail::hasColumns<Storage>) {
+      using Tile = detail::BodyTile<Scalar>;
+      const auto tile = [&](auto field, std::size_t c = 0) {
+        return Tile(detail::tileOf(storage_, field, c, i));
+      };
+      const Tile m = tile(fields::Mass{});
+      const Tile r = tile(fields::Radius{});
+      const Tile k = tile(fields::InertiaFactor{});
+      Tile q_sq = tile(fields::Orientation{}, 3).square();
+      Tile size = m + r + k;
+      for (std::size_t c = 0; c < 3; ++c) {
+        size += (tile(fields::Position{}, c).abs() + tile(fields::Velocity{}, c).abs()) +
+                tile(fields::AngularVelocity{}, c).abs();
+        q_sq += tile(fields::Orientation{}, c).square();
+      }
+      size += q_sq;  // finite if all is, or huge
+      for (std::size_t lane = 0; lane < std::min(detail::tileWidth, end - i); ++lane) {
+        const auto at = static_cast<Eigen::Index>(lane);
+        if (!(size[at] <= std::numeric_limits<Scalar>::max() && m[at] >= Scalar(0) && r[at] >= Scalar(0) &&
+              (m[at] > Scalar(0) || r[at] == Scalar(0)) && k[at] > Scalar(0) && q_sq[at] > Scalar(0))) {
+          validateOne(i + lane);
+        }
+      }
+    }
+  }
+
   static void checkFactor(const Scalar& k, const std::string& who) {
     if (!isFinite(k) || !(k > Scalar(0))) {
       detail::refuse("inertiaFactor of " + who, detail::formatReal(k), "finite, > 0");

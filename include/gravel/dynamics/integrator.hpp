@@ -14,39 +14,94 @@ namespace detail {
 
 constexpr std::size_t bodyGrain = 2048;
 
-/// v += a kick; then x += v drift, and the orientation with it. One pass; fixed bodies stay.
-/// `torques` tells whether any angular acceleration can differ from zero.
+/// v += a kick; then x += v drift, and the orientation with it, of one body; a fixed one stays.
 template <Real Scalar, class Layout>
-void kickAndDrift(Bodies<Scalar, Layout>& bodies, const Scalar& kick, const Scalar& drift, bool torques,
-                  Compensation<Scalar>* lost) {
-  parallelFor(bodies.size(), bodyGrain, [&](std::size_t i) {
-    const auto body = bodies[i];
-    if (body.isFixed()) {
-      return;
+void kickAndDriftOne(Bodies<Scalar, Layout>& bodies, std::size_t i, const Scalar& kick, const Scalar& drift,
+                     bool torques, Compensation<Scalar>* lost) {
+  const auto body = bodies[i];
+  if (body.isFixed()) {
+    return;
+  }
+  if (!(kick == Scalar(0))) {
+    if (lost != nullptr) {
+      (*lost)[i].velocity.add(body.velocity(), body.acceleration() * kick);
+    } else {
+      body.velocity() += body.acceleration() * kick;
     }
-    auto&& v = body.velocity();
-    auto&& w = body.angularVelocity();
-    if (!(kick == Scalar(0))) {
+    if (torques) {
+      body.angularVelocity() += body.angularAcceleration() * kick;
+    }
+  }
+  if (!(drift == Scalar(0))) {
+    if (lost != nullptr) {
+      (*lost)[i].position.add(body.position(), body.velocity() * drift);
+    } else {
+      body.position() += body.velocity() * drift;
+    }
+    const Vector3<Scalar> spin = body.angularVelocity();
+    if (!(spin.squaredNorm() == Scalar(0))) {
+      body.orientation() = rotated(Quaternion<Scalar>(body.orientation()), spin, drift);
+    }
+  }
+}
+
+/// The same for a tile of movable bodies, the first of which is i; those from `end` on are none.
+template <Real Scalar, class Layout>
+void kickAndDriftTile(Bodies<Scalar, Layout>& bodies, std::size_t i, std::size_t end, const Scalar& kick,
+                      const Scalar& drift, bool torques, Compensation<Scalar>* lost) {
+  if constexpr (hasColumns<typename Bodies<Scalar, Layout>::Storage>) {
+    using Lane = BodyTile<Scalar>;
+    auto& storage = bodies.storage();
+    const auto tiles = [&](auto field) {
+      return std::array{tileOf(storage, field, 0, i), tileOf(storage, field, 1, i),
+                        tileOf(storage, field, 2, i)};
+    };
+    const auto times = [](auto& rates, const Scalar& time) {
+      return std::array<Lane, 3>{rates[0] * time, rates[1] * time, rates[2] * time};
+    };
+    const auto add = [&](auto& sums, const std::array<Lane, 3>& terms, std::size_t row) {
       if (lost != nullptr) {
-        (*lost)[i].velocity.add(v, body.acceleration() * kick);
+        lost->addTile(i, row, sums, terms);
       } else {
-        v += body.acceleration() * kick;
+        for (std::size_t c = 0; c < 3; ++c) {
+          sums[c] += terms[c];
+        }
       }
-      if (torques) {
-        w += body.angularAcceleration() * kick;
+    };
+    auto v = tiles(fields::Velocity{});
+    auto w = tiles(fields::AngularVelocity{});
+    if (!(kick == Scalar(0))) {
+      auto a = tiles(fields::Acceleration{});
+      add(v, times(a, kick), 3);
+      for (std::size_t c = 0; torques && c < 3; ++c) {
+        w[c] += tileOf(storage, fields::AngularAcceleration{}, c, i) * kick;
       }
     }
     if (!(drift == Scalar(0))) {
-      if (lost != nullptr) {
-        (*lost)[i].position.add(body.position(), v * drift);
-      } else {
-        body.position() += v * drift;
-      }
-      const Vector3<Scalar> spin = w;
-      if (!(spin.squaredNorm() == Scalar(0))) {
-        body.orientation() = rotated(Quaternion<Scalar>(body.orientation()), spin, drift);
+      auto x = tiles(fields::Position{});
+      add(x, times(v, drift), 0);
+      const Lane spins = w[0].abs() + w[1].abs() + w[2].abs();
+      if (!(spins.sum() == Scalar(0))) {
+        for (std::size_t k = i; k < std::min(i + tileWidth, end); ++k) {
+          const Vector3<Scalar> spin = bodies[k].angularVelocity();
+          if (!(spin.squaredNorm() == Scalar(0))) {
+            bodies[k].orientation() = rotated(Quaternion<Scalar>(bodies[k].orientation()), spin, drift);
+          }
+        }
       }
     }
+  }
+}
+
+/// Both for all bodies, in one pass. `torques` tells whether any angular acceleration can differ from zero.
+template <Real Scalar, class Layout>
+void kickAndDrift(Bodies<Scalar, Layout>& bodies, const Scalar& kick, const Scalar& drift, bool torques,
+                  Compensation<Scalar>* lost) {
+  parallelForChunks(bodies.size(), bodyGrain, [&](std::size_t begin, std::size_t end) {
+    forTilesOrBodies(
+        bodies.storage(), begin, end,
+        [&](std::size_t i) { kickAndDriftTile(bodies, i, end, kick, drift, torques, lost); },
+        [&](std::size_t i) { kickAndDriftOne(bodies, i, kick, drift, torques, lost); });
   });
 }
 

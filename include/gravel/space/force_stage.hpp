@@ -39,19 +39,10 @@ class ForceStage {
     } else {
       profiler.skip(Phase::Gravity, reason);
     }
-    parallelFor(n, detail::bodyGrain, [&](std::size_t i) {
-      const auto body = bodies[i];
-      auto&& a = body.acceleration();
-      if (reason != nullptr) {
-        a = Vector3<Scalar>::Zero().eval();
-      }
-      if (body.isFixed()) {
-        body.force() = a * Scalar(body.mass());
-        a = Vector3<Scalar>::Zero().eval();
-      } else {
-        a += field;
-        body.force() = a * Scalar(body.mass());
-      }
+    parallelForChunks(n, detail::bodyGrain, [&](std::size_t begin, std::size_t end) {
+      detail::forTilesOrBodies(
+          bodies.storage(), begin, end, [&](std::size_t i) { finishTile(bodies, i, reason == nullptr); },
+          [&](std::size_t i) { finishOne(bodies, i, reason == nullptr); });
     });
     if (hook) {
       addHook(bodies, time);
@@ -97,6 +88,36 @@ class ForceStage {
   }
 
  private:
+  /// The field's part of the acceleration, and the force.
+  void finishOne(Bodies<Scalar, Layout>& bodies, std::size_t i, bool pulls) const {
+    const auto body = bodies[i];
+    auto&& a = body.acceleration();
+    if (!pulls) {
+      a = Vector3<Scalar>::Zero().eval();
+    }
+    if (body.isFixed()) {
+      body.force() = a * Scalar(body.mass());
+      a = Vector3<Scalar>::Zero().eval();
+    } else {
+      a += field;
+      body.force() = a * Scalar(body.mass());
+    }
+  }
+
+  /// The same for a tile of movable bodies.
+  void finishTile(Bodies<Scalar, Layout>& bodies, std::size_t i, bool pulls) const {
+    if constexpr (detail::hasColumns<typename Bodies<Scalar, Layout>::Storage>) {
+      auto& storage = bodies.storage();
+      const detail::BodyTile<Scalar> m = detail::tileOf(storage, fields::Mass{}, 0, i);
+      for (std::size_t c = 0; c < 3; ++c) {
+        auto a = detail::tileOf(storage, fields::Acceleration{}, c, i);
+        const Scalar g = field[static_cast<Eigen::Index>(c)];
+        a = pulls ? detail::BodyTile<Scalar>(a + g) : detail::BodyTile<Scalar>::Constant(Scalar(0) + g);
+        detail::tileOf(storage, fields::Force{}, c, i) = a * m;
+      }
+    }
+  }
+
   const char* reasonToSkip(const Bodies<Scalar, Layout>& bodies, const Scalar& G) const {
     if (G == Scalar(0)) {
       return "G is 0";

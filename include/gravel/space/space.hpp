@@ -15,6 +15,7 @@
 #include <gravel/space/contact_stage.hpp>
 #include <gravel/space/force_stage.hpp>
 #include <gravel/space/orbit_stage.hpp>
+#include <gravel/space/place_tile.hpp>
 #include <gravel/space/random_bodies.hpp>
 #include <gravel/space/settings.hpp>
 
@@ -248,7 +249,8 @@ class Space : public Settings<Scalar> {
   Compensation<Scalar> lost_;  // what kicks and drifts lost to rounding
 
   // Positions and masses at the last force evaluation: forces are renewed if somebody changed them.
-  std::vector<Eigen::Array<Scalar, 4, 1>> places_;
+  std::vector<detail::PlaceTile<Scalar>> places_;
+  std::size_t placed_ = 0;
   bool forcesValid_ = false;
 };
 

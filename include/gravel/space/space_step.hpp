@@ -72,6 +72,7 @@ struct Space<Scalar, Layout>::Departure {
 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration) {
+  const Profiler::Step timing(profiler_);
   if (!bodies_.empty()) {
     ledgerOpen_ = true;
     previous_dt_ = h;
@@ -147,40 +148,30 @@ void Space<Scalar, Layout>::prepare() {
   }
 }
 
-namespace detail {
-
-/// The mass of a movable body; another number if it is fixed.
-template <class Proxy, class Scalar = typename Proxy::Scalar>
-Scalar massAndState(const Proxy& body) {
-  const Scalar m = body.mass();
-  return body.isFixed() ? Scalar(-m - Scalar(1)) : m;
-}
-
-}  // namespace detail
-
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::rememberPlaces() {
-  places_.resize(n());
-  parallelFor(n(), detail::bodyGrain, [&](std::size_t i) {
-    places_[i].template head<3>() = bodies_[i].position().array();
-    places_[i][3] = detail::massAndState(bodies_[i]);
+  placed_ = n();
+  places_.resize(tileCount(n(), static_cast<int>(detail::tileWidth)));
+  parallelForChunks(n(), detail::bodyGrain, [&](std::size_t begin, std::size_t end) {
+    detail::forTilesOrBodies(
+        bodies_.storage(), begin, end,
+        [&](std::size_t i) { places_[i / detail::tileWidth].take(bodies_, i); },
+        [&](std::size_t i) { places_[i / detail::tileWidth].takeOne(bodies_, i); });
   });
   forcesValid_ = true;
 }
 
 template <Real Scalar, class Layout>
 bool Space<Scalar, Layout>::placesChanged() const {
-  if (places_.size() != n()) {
+  if (placed_ != n()) {
     return true;
   }
   const auto moved = orderedSum(n(), 4096, std::size_t{0}, [&](std::size_t begin, std::size_t end) {
     std::size_t count = 0;
-    for (std::size_t i = begin; i < end; ++i) {
-      const auto body = bodies_[i];
-      const bool same = (places_[i].template head<3>() == body.position().array()).all() &&
-                        places_[i][3] == detail::massAndState(body);
-      count += same ? 0 : 1;
-    }
+    detail::forTilesOrBodies(
+        bodies_.storage(), begin, end,
+        [&](std::size_t i) { count += places_[i / detail::tileWidth].holds(bodies_, i, end) ? 0 : 1; },
+        [&](std::size_t i) { count += places_[i / detail::tileWidth].holdsOne(bodies_, i) ? 0 : 1; });
     return count;
   });
   return moved > 0;
