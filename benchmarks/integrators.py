@@ -17,6 +17,7 @@ TITLES = {
     "kepler": "Kepler, e = 0.9, 32 orbits",
     "outer solar system": "outer solar system, 100 orbits of Jupiter",
     "plummer": "Plummer sphere, 1000 bodies, 2 time units",
+    "binary": "a binary of 41 periods in a cluster of 300, 0.1 time units",
     "bounce": "bounce under mutual gravity",
 }
 COLOURS = {
@@ -36,7 +37,7 @@ def main(source, target):
                 if row["integrator"] == "GaussRadau15" and error == 0.0:
                     error = float(row["energy_error"])  # the reference itself
                 curves[row["problem"], row["integrator"]].append((float(row["seconds"]), error))
-    figure, axes = plt.subplots(2, 2, figsize=(11, 9))
+    figure, axes = plt.subplots(3, 2, figsize=(11, 13))
     for axis, (problem, title) in zip(axes.flat, TITLES.items()):
         for (name, integrator), points in curves.items():
             if name != problem:
@@ -53,7 +54,9 @@ def main(source, target):
         axis.set_xlabel("processor time [s]")
         axis.set_ylabel("relative position error")
         axis.grid(alpha=0.3)
-        axis.legend(fontsize=6)
+        axis.legend(fontsize=6, framealpha=0.4)
+    for axis in axes.flat[len(TITLES):]:
+        axis.axis("off")
     figure.tight_layout()
     figure.savefig(target, dpi=90)
 
