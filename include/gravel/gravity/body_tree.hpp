@@ -9,6 +9,7 @@
 #include <gravel/spatial/morton.hpp>
 
 #include <algorithm>
+#include <array>
 #include <vector>
 
 namespace gravel::detail {
@@ -60,6 +61,58 @@ struct BodyTree {
   static constexpr std::size_t margin = 16;
 
   std::size_t size() const { return body.size(); }
+
+  /// The number of rows before this one that have mass: those of [first, last) stand side by side, from
+  /// sourcesBefore(first) to sourcesBefore(last), in the columns of sources().
+  std::uint32_t sourcesBefore(std::uint32_t row) const { return before_.empty() ? row : before_[row]; }
+  std::array<const std::vector<S>*, 4> sources() const {
+    if (before_.empty()) {
+      return {&x, &y, &z, &m};
+    }
+    return {&packed_[0], &packed_[1], &packed_[2], &packed_[3]};
+  }
+
+  /// Finds them, after build(); without massless bodies they are the columns themselves.
+  void packSources() {
+    before_.clear();
+    if (std::find(m.begin(), m.begin() + static_cast<std::ptrdiff_t>(size()), S(0)) ==
+        m.begin() + static_cast<std::ptrdiff_t>(size())) {
+      return;
+    }
+    for (std::vector<S>& column : packed_) {
+      column.clear();
+    }
+    before_.reserve(size() + 1);
+    for (std::size_t row = 0; row < size(); ++row) {
+      before_.push_back(static_cast<std::uint32_t>(packed_[0].size()));
+      if (m[row] > S(0)) {
+        packed_[0].push_back(x[row]);
+        packed_[1].push_back(y[row]);
+        packed_[2].push_back(z[row]);
+        packed_[3].push_back(m[row]);
+      }
+    }
+    before_.push_back(static_cast<std::uint32_t>(packed_[0].size()));
+    for (std::vector<S>& column : packed_) {
+      column.resize(column.size() + margin, S(0));
+    }
+  }
+
+  /// Fields are wanted at all rows, or at those with isWanted[body] alone. After build().
+  void setSinks(const std::vector<std::uint8_t>& isWanted) {
+    sinksBefore_.clear();
+    if (!isWanted.empty()) {
+      sinksBefore_.assign(1, 0);
+      for (const std::uint32_t i : body) {
+        sinksBefore_.push_back(sinksBefore_.back() + (isWanted[i] != 0 ? 1U : 0U));
+      }
+    }
+  }
+  bool allSinks() const { return sinksBefore_.empty(); }
+  /// Whether a field is wanted anywhere in [first, last).
+  bool hasSinks(std::uint32_t first, std::uint32_t last) const {
+    return allSinks() || sinksBefore_[first] != sinksBefore_[last];
+  }
 
   void resize(std::size_t n) {
     for (std::vector<S>* column : {&x, &y, &z, &m}) {
@@ -216,6 +269,9 @@ struct BodyTree {
   static unsigned shift(int level) { return 3U * static_cast<unsigned>(bits - 1 - level); }
   std::uint64_t digit(std::uint32_t row, int level) const { return keys_[row].key >> shift(level) & 7U; }
 
+  std::vector<std::uint32_t> before_;  ///< empty where all rows have mass
+  std::array<std::vector<S>, 4> packed_;
+  std::vector<std::uint32_t> sinksBefore_;  ///< empty where all are wanted
   std::vector<Key> keys_;
   std::vector<Frame> frames_;  ///< of each cell
   std::vector<S> edges_;

@@ -3,13 +3,8 @@
 /// \file
 /// Gravity by summing every pair: exact to rounding, mutual, and the same bits for any number of threads.
 
-#include <gravel/core/parallel.hpp>
+#include <gravel/gravity/direct_rows.hpp>
 #include <gravel/gravity/few_bodies.hpp>
-#include <gravel/gravity/gravity_units.hpp>
-#include <gravel/gravity/image_field.hpp>
-#include <gravel/gravity/pair_tiles.hpp>
-
-#include <algorithm>
 
 namespace gravel {
 
@@ -25,21 +20,10 @@ namespace gravel {
 /// no block plays twice, so the order of every sum is a function of N alone. One object serves one caller at
 /// a time.
 template <Real S>
-class DirectSum {
+class DirectSum : public detail::DirectRows<S> {
+  using Rows = detail::DirectRows<S>;
+
  public:
-  /// In a periodic domain every body is pulled by all images of all bodies, its own among them, over the
-  /// homogeneous background that makes the mean density zero; in a shear-periodic one by the images in x and
-  /// y, where they are at `time` [s], and gravity is open in z. Near images are summed pair by pair, and
-  /// softened; all others, as points, through one expansion of their lattice. Bodies may stand outside of the
-  /// box. A sum over n images costs n/2 + 1 times an open one.
-  void setDomain(const Domain<S>& domain, const S& time = S(0)) { images_.setDomain(domain, time); }
-
-  /// Error of the far images, relative to rms accelerations. \param tolerance > 0
-  void setImageTolerance(const S& tolerance) {
-    detail::require("image tolerance", tolerance, detail::positive<S>());
-    imageTolerance_ = tolerance;
-  }
-
   /// out[i] = -sum_j G m_j (x_i - x_j) / (|x_i - x_j|^2 + softening^2)^(3/2) [m s^-2], for every i.
   /// \param G [m^3 kg^-1 s^-2]  \param softening [m] >= 0
   /// \throws std::invalid_argument for values that are not finite, negative masses or softening
@@ -56,14 +40,26 @@ class DirectSum {
     sumMutual();
     sumTracers();
     if (!images_.isOpen()) {
-      sumImages();
+      sumImages(true);
     }
-    const auto factor = units_.acceleration(G);
-    for (std::size_t row = 0; row < body_.size(); ++row) {
-      if (body_[row] != filling) {
-        out[body_[row]] = Vector3<S>(factor(table_.ax[row]), factor(table_.ay[row]), factor(table_.az[row]));
-      }
+    putOut(G, 0, out);
+  }
+
+  /// As accelerations(), but out[i] is found for these numbers i only, and the others are left as they are.
+  /// Each is summed over all bodies, one way, in the order of rows: not the bits of the mutual sum.
+  /// O(numbers N + N). \throws std::invalid_argument for a number that no body has, besides
+  template <class Numbers, class Positions, class Masses, class Accelerations>
+  void accelerationsOf(const Numbers& numbers, const Positions& positions, const Masses& masses, const S& G,
+                       const S& softening, Accelerations&& out) {
+    detail::requireBodies(numbers, positions.size());
+    gather(positions, masses, G, softening);
+    this->gatherSinks(numbers, positions);
+    table_.clearAccelerations();
+    sumTracers();
+    if (!images_.isOpen()) {
+      sumImages(false);
     }
+    putOut(G, tracerBegin_, out);
   }
 
   /// -G sum_{i<j} m_i m_j / sqrt(|x_i - x_j|^2 + softening^2) [J]; coincident unsoftened points add nothing.
@@ -120,65 +116,26 @@ class DirectSum {
   }
 
  private:
-  static constexpr std::size_t width = detail::PairTable<S>::width;
-  static constexpr std::size_t filling = std::numeric_limits<std::size_t>::max();
+  using Rows::blockSize;
+  using Rows::body_;
+  using Rows::filling;
+  using Rows::gather;
+  using Rows::images_;
+  using Rows::placeCopies;
+  using Rows::shareOut;
+  using Rows::table_;
+  using Rows::tracerBegin_;
+  using Rows::units_;
 
-  /// Bodies a block: small enough that two blocks stay in the nearest cache and there is work for many
-  /// threads, large enough that the reductions of a source do not count.
-  static constexpr std::size_t blockSize(std::size_t n) {
-    return n < 1024 ? 64 : n < 8192 ? 128 : detail::PairTable<S>::maxBlock;
-  }
-
-  /// Below this many pairs a parallel region costs more than it brings.
-  static constexpr std::size_t pairsWorthThreads = 50000;
-
-  template <class F>
-  static void shareOut(std::size_t tasks, std::size_t n, F&& f) {
-    if (n * n / 2 < pairsWorthThreads) {
-      for (std::size_t task = 0; task < tasks; ++task) {
-        f(task);
-      }
-    } else {
-      parallelForTasks(tasks, f);
-    }
-  }
-
-  template <class Positions, class Masses>
-  void gather(const Positions& positions, const Masses& masses, const S& G, const S& softening) {
-    const std::size_t n = positions.size();
-    units_ = detail::GravityUnits<S>(positions, masses, G, softening, images_.box());
-    images_.prepare(units_.perLength(), units_.low(), units_.high(), imageTolerance_);
-    const S perLength = units_.perLength();
-    const S perMass = units_.perMass();
-    const std::size_t sources = units_.sources();
-    table_.softening_sq = (softening * perLength) * (softening * perLength);
-    table_.sourceEnd = wholeTiles(sources);
-    tracerBegin_ = images_.isOpen() ? table_.sourceEnd : 2 * table_.sourceEnd;
-    table_.resize(tracerBegin_ + wholeTiles(n - sources));
-    body_.assign(table_.size(), filling);
-    std::size_t nextSource = 0;
-    std::size_t nextTracer = tracerBegin_;
-    for (std::size_t i = 0; i < n; ++i) {
-      const S m = masses[i];
-      const std::size_t row = m > S(0) ? nextSource++ : nextTracer++;
-      const Vector3<S> x = images_.home(positions[i]) * perLength;
-      body_[row] = i;
-      place(row, x, m * perMass);
-    }
-    for (const std::size_t from : {nextSource, nextTracer}) {
-      for (std::size_t row = from; row % width != 0; ++row) {
-        place(row, Vector3<S>(table_.x[from - 1], table_.y[from - 1], table_.z[from - 1]), S(0));
+  /// \param from first row
+  template <class Accelerations>
+  void putOut(const S& G, std::size_t from, Accelerations&& out) const {
+    const auto factor = units_.acceleration(G);
+    for (std::size_t row = from; row < body_.size(); ++row) {
+      if (body_[row] != filling) {
+        out[body_[row]] = Vector3<S>(factor(table_.ax[row]), factor(table_.ay[row]), factor(table_.az[row]));
       }
     }
-  }
-
-  static std::size_t wholeTiles(std::size_t n) { return (n + width - 1) / width * width; }
-
-  void place(std::size_t row, const Vector3<S>& x, const S& m) {
-    table_.x[row] = x[0];
-    table_.y[row] = x[1];
-    table_.z[row] = x[2];
-    table_.m[row] = m;
   }
 
   /// Round-robin tournament by the circle method: first every block against itself, then rounds of disjoint
@@ -216,17 +173,10 @@ class DirectSum {
     });
   }
 
-  /// Copies of the sources, shifted, behind the sources.
-  void placeCopies(const Vector3<S>& shift) {
-    const std::size_t n = table_.sourceEnd;
-    for (std::size_t row = 0; row < n; ++row) {
-      place(n + row, Vector3<S>(table_.x[row], table_.y[row], table_.z[row]) + shift, table_.m[row]);
-    }
-  }
-
   /// Of opposite images one is summed, mutually: what it feels is what the other does. Rounds in which each
   /// block of sources meets another block of copies.
-  void sumImages() {
+  /// \param mutual false: the rows behind the copies feel, no others
+  void sumImages(bool mutual) {
     const std::size_t n = table_.sourceEnd;
     const std::size_t block = blockSize(n);
     const std::size_t blocks = (n + block - 1) / block;
@@ -235,7 +185,7 @@ class DirectSum {
     for (std::size_t image = 1; image < shifts.size(); ++image) {
       placeCopies(shifts[image]);
       sumTracers(n);
-      for (std::size_t round = 0; round < blocks && image % 2 == 1; ++round) {
+      for (std::size_t round = 0; mutual && round < blocks && image % 2 == 1; ++round) {
         shareOut(blocks, n, [&](std::size_t a) {
           const std::size_t b = (a + round) % blocks;
           table_.addMutual(a * block, end(a), n + b * block, n + end(b));
@@ -281,16 +231,7 @@ class DirectSum {
     return sum;
   }
 
-  /// Of expansions; see FastMultipole.
-  using F = std::conditional_t<std::is_same_v<S, float>, double, S>;
-
-  detail::PairTable<S> table_;
-  std::vector<std::size_t> body_;  ///< the body of each row
-  std::size_t tracerBegin_ = 0;
-  detail::GravityUnits<S> units_;
-  detail::PeriodicImages<S, F> images_;
-  detail::ImageField<S, F> farImages_;
-  S imageTolerance_ = S(1e-10);
+  detail::ImageField<S, typename Rows::F> farImages_;
 };
 
 }  // namespace gravel

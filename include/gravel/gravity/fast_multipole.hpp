@@ -61,6 +61,27 @@ class FastMultipole {
     });
   }
 
+  /// As accelerations(), with the same bits, but out[i] is found for these numbers i only, and the others
+  /// are left as they are. The tree and its moments cost what they cost for all. \throws
+  /// std::invalid_argument for a number that no body has, besides
+  template <class Numbers, class Positions, class Masses, class Accelerations>
+  void accelerationsOf(const Numbers& numbers, const Positions& positions, const Masses& masses, const S& G,
+                       const S& softening, Accelerations&& out) {
+    detail::requireBodies(numbers, positions.size());
+    wanted_.assign(positions.size(), 0);
+    for (std::size_t k = 0; k < numbers.size(); ++k) {
+      wanted_[static_cast<std::size_t>(numbers[k])] = 1;
+    }
+    evaluate(positions, masses, G, softening, false, true);
+    const auto factor = units_.acceleration(G);
+    for (std::size_t row = 0; row < tree_.size(); ++row) {
+      if (wanted_[tree_.body[row]] != 0) {
+        out[tree_.body[row]] =
+            Vector3<S>(factor(fields_.ax[row]), factor(fields_.ay[row]), factor(fields_.az[row]));
+      }
+    }
+  }
+
   /// As DirectSum::potentialEnergy.
   template <class Positions, class Masses>
   S potentialEnergy(const Positions& positions, const Masses& masses, const S& G, const S& softening) {
@@ -87,7 +108,7 @@ class FastMultipole {
 
   template <class Positions, class Masses>
   void evaluate(const Positions& positions, const Masses& masses, const S& G, const S& softening,
-                bool withPotential) {
+                bool withPotential, bool onlyWanted = false) {
     if (positions.size() > mostBodies) {
       detail::refuse("number of bodies of a fast multipole sum", std::to_string(positions.size()),
                      "at most 2^32 - 1");
@@ -101,6 +122,8 @@ class FastMultipole {
       return;
     }
     tree_.build(leafSize);
+    tree_.packSources();
+    tree_.setSinks(onlyWanted ? wanted_ : std::vector<std::uint8_t>());
     const S eps = softening * units_.perLength();
     if (eps > S(0)) {
       walk(softMoments_, S(eps * eps));
@@ -166,6 +189,7 @@ class FastMultipole {
   detail::FieldStrength<S, F> strength_;
   detail::SinkFields<S> fields_;
   detail::WalkCount count_;
+  std::vector<std::uint8_t> wanted_;  ///< by body
 };
 
 }  // namespace gravel

@@ -71,6 +71,21 @@ class GravitySolver {
           [&](auto& method) { method.accelerations(positions, masses, G, softening, out); });
   }
 
+  /// The same for bodies of these numbers only; see DirectSum. The method is that for all bodies.
+  template <class Numbers, class Positions, class Masses, class Accelerations>
+  void accelerationsOf(const Numbers& numbers, const Positions& positions, const Masses& masses, const S& G,
+                       const S& softening, Accelerations&& out) {
+    if (G == S(0)) {
+      detail::requireBodies(numbers, positions.size());
+      for (std::size_t k = 0; k < numbers.size(); ++k) {
+        out[static_cast<std::size_t>(numbers[k])] = Vector3<S>(Vector3<S>::Zero());
+      }
+      return;
+    }
+    visit(positions.size(),
+          [&](auto& method) { method.accelerationsOf(numbers, positions, masses, G, softening, out); });
+  }
+
   /// [J]; see DirectSum.
   template <class Positions, class Masses>
   S potentialEnergy(const Positions& positions, const Masses& masses, const S& G, const S& softening) {

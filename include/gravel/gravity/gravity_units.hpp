@@ -9,6 +9,17 @@
 
 namespace gravel::detail {
 
+/// \throws std::invalid_argument for a number that no body has
+template <class Numbers>
+void requireBodies(const Numbers& numbers, std::size_t bodies) {
+  for (std::size_t k = 0; k < numbers.size(); ++k) {
+    if (!(static_cast<std::size_t>(numbers[k]) < bodies)) {
+      refuse("number of a body in a gravity sum", std::to_string(numbers[k]),
+             "below the number of bodies, " + std::to_string(bodies));
+    }
+  }
+}
+
 /// Powers of two near the extent and the largest mass of a system, so that conversions are exact.
 template <Real S>
 class GravityUnits {

@@ -85,6 +85,9 @@ class MultipoleWalk {
   void descend(std::uint32_t c, std::size_t begin, std::size_t end, std::size_t local) {
     const Cell& cell = tree_.cells[c];
     const std::size_t terms = far_.terms();
+    if (!tree_.hasSinks(cell.first, cell.last)) {
+      return;
+    }
     if (prepared_ != nullptr && (cell.count() <= handOver_ || cell.isLeaf())) {
       prepared_->push_back(
           {c, {at(locals_, local), at(locals_, local + terms)}, {at(stack_, begin), at(stack_, end)}});

@@ -51,6 +51,9 @@ class NearField {
     padSources();
     const bool withPotential = !out.potential.empty();
     for (std::uint32_t i = first; i < last; i += 4) {
+      if (!tree.hasSinks(i, std::min(last, i + 4))) {
+        continue;
+      }
       const std::uint32_t sinks = std::min<std::uint32_t>(4, last - i);
       if (withPotential) {
         choose<true>(sinks, tree, i, softening_sq, out);
@@ -77,7 +80,7 @@ class NearField {
         const S dy = tree.y[j] - tree.y[i];
         const S dz = tree.z[j] - tree.z[i];
         const S s = dx * dx + dy * dy + dz * dz + softening_sq;
-        if (j != i) {
+        if (j != i && tree.m[j] > S(0)) {
           const S f = tree.m[j] * PairLaw<S>::accelerationFactor(s);
           out.ax[i] += f * dx;
           out.ay[i] += f * dy;
@@ -95,11 +98,12 @@ class NearField {
 
   template <class Tree, class Move>
   void append(const Tree& tree, std::uint32_t first, std::uint32_t last, Move&& move) {
-    const std::size_t n = last - first;
+    const std::uint32_t begin = tree.sourcesBefore(first);
+    const std::size_t n = tree.sourcesBefore(last) - begin;
     reserve(count_ + n + width);
-    const std::vector<S>* from[4] = {&tree.x, &tree.y, &tree.z, &tree.m};
+    const auto from = tree.sources();
     for (std::size_t column = 0; column < 4; ++column) {
-      const S* source = from[column]->data() + first;
+      const S* source = from[column]->data() + begin;
       S* to = columns_[column].data() + count_;
       for (std::size_t i = 0; i < n; i += width) {  // whole tiles: the tree's columns go on behind their end
         Tile::store(to + i, move(column, Tile::load(source + i)));
