@@ -1,7 +1,7 @@
 #pragma once
 
 /// \file
-/// Removes overlap by moving positions, never by velocity: no energy of motion is made.
+/// Removes overlap by moving positions: no energy of motion is made.
 
 #include <gravel/contact/contact_coloring.hpp>
 #include <gravel/core/parallel.hpp>
@@ -20,6 +20,8 @@ struct CorrectionSettings {
   /// [1] >= 0: overlaps that are right to this times the smaller radius are right.
   Scalar precision = Scalar(1e-4);
   int maxIterations = 20;  ///< >= 1
+  /// A pair that is moved apart keeps its angular momentum: it turns the slower. Off: velocities stay.
+  bool keepAngularMomentum = true;
 };
 
 /// A body that was moved, and by how much [m].
@@ -34,12 +36,18 @@ struct CorrectionReport {
   int iterations = 0;
   Scalar largestOverlap = Scalar(0);  ///< [m] before
   Scalar residual = Scalar(0);        ///< [m] largest move of the last sweep
+  Scalar loss = Scalar(0);            ///< [J] >= 0, of energy of motion
 };
 
 /// Nonlinear projected Gauss-Seidel over the colours of the contacts: in turn each contact that is still
 /// closer than it should be is opened along its present normal, by inverse mass, so that the common centre of
 /// mass of movable bodies stays to rounding. Distances are recomputed from the moved positions; only relative
 /// displacements enter, so that a place far from the origin costs no digits.
+///
+/// Two free spheres that are moved apart from r to r + d would gain the angular momentum m* d x v of their
+/// relative velocity v. As on an orbit, the part of v across r becomes v_t r/(r + d) instead: momentum and
+/// angular momentum stay to rounding, and energy of motion can only fall. A rejected way: to give the
+/// difference to the spins, which would turn smooth spheres.
 template <Real S>
 class PositionalCorrection {
  public:
@@ -63,22 +71,25 @@ class PositionalCorrection {
       return report;  // what resting contacts leave to each other
     }
     do {
-      report.residual = S(0);
-      for (std::size_t c = 0; c <= colouring.colours(); ++c) {
-        // Lone contacts go with the first colour, and are right after one sweep.
-        const std::size_t begin = c == 0 ? 0 : colouring.begin(c);
-        const S largest = sweep(begin, colouring.end(c), c < colouring.colours());
-        report.residual = std::max<S>(report.residual, largest);
-      }
+      // Lone contacts are right after one sweep.
+      const auto one = [&](std::size_t k) { return open(k, settings.keepAngularMomentum); };
+      Opened opened = detail::sumOverRows(0, colouring.loneCount(), Opened{}, one);
+      opened += detail::sumOverColours(colouring, Opened{}, one);
+      report.residual = opened.largest;
+      report.loss += opened.loss;
       ++report.iterations;
     } while (report.residual > enough && report.iterations < settings.maxIterations);
     auto&& positions = bodies.positions();
+    auto&& velocities = bodies.velocities();
     for (std::uint32_t slot = 0; slot < colouring.bodies().size(); ++slot) {
       const Vector3<S>& shift = shifts_[slot].d;
       if (shift != Vector3<S>::Zero()) {
         const std::uint32_t i = colouring.bodies()[slot];
         positions[i] += shift;
         moved_.push_back({i, shift});
+        if (shifts_[slot].dv != Vector3<S>::Zero()) {
+          velocities[i] += shifts_[slot].dv;
+        }
       }
     }
     return report;
@@ -91,6 +102,8 @@ class PositionalCorrection {
   struct Shift {
     Vector3<S> d;
     S mass;  ///< 0 for immovable
+    Vector3<S> v;
+    Vector3<S> dv;  ///< that v was changed by
   };
   struct Row {
     Vector3<S> r;  ///< from the first centre to the second at detection; to a boundary: its normal
@@ -102,7 +115,16 @@ class PositionalCorrection {
     std::uint32_t slot2;
     bool boundary;
   };
-  static constexpr std::size_t chunk = 1024;
+  /// What a sweep did.
+  struct Opened {
+    S largest = S(0);
+    S loss = S(0);
+    Opened& operator+=(const Opened& other) {
+      largest = std::max<S>(largest, other.largest);
+      loss += other.loss;
+      return *this;
+    }
+  };
 
   template <class B>
   void prepare(std::span<const Contact<S>> contacts, const ContactColoring& colouring, const B& bodies,
@@ -110,8 +132,11 @@ class PositionalCorrection {
     const std::size_t n = colouring.bodies().size();
     shifts_.resize(n + 1);
     for (std::uint32_t slot = 0; slot <= n; ++slot) {
-      shifts_[slot].d = Vector3<S>::Zero();
-      shifts_[slot].mass = colouring.movable(slot) ? S(bodies.masses()[colouring.bodies()[slot]]) : S(0);
+      const bool movable = colouring.movable(slot);
+      const std::uint32_t i = movable ? colouring.bodies()[slot] : 0;
+      shifts_[slot] = {Vector3<S>::Zero(), movable ? S(bodies.masses()[i]) : S(0),
+                       movable ? Vector3<S>(bodies.velocities()[i]) : Vector3<S>(Vector3<S>::Zero()),
+                       Vector3<S>::Zero()};
     }
     rows_.resize(contacts.size());
     for (std::size_t k = 0; k < rows_.size(); ++k) {
@@ -145,57 +170,51 @@ class PositionalCorrection {
     }
   }
 
-  S sweep(std::size_t begin, std::size_t end, bool disjoint) {
-    if (!disjoint || end - begin < 4 * chunk || threadCount() == 1) {
-      return open(begin, end);
-    }
-    changes_.assign((end - begin + chunk - 1) / chunk, S(0));
-    parallelForChunks(end - begin, chunk, [&](std::size_t from, std::size_t to) {
-      changes_[from / chunk] = open(begin + from, begin + to);
-    });
-    return *std::max_element(changes_.begin(), changes_.end());
-  }
-
-  S open(std::size_t begin, std::size_t end) {
-    S largest(0);
-    for (std::size_t k = begin; k < end; ++k) {
-      const Row& row = rows_[k];
-      Shift& b1 = shifts_[row.slot1];
-      Shift& b2 = shifts_[row.slot2];
-      const Vector3<S> d = b2.d - b1.d;
-      Vector3<S> n = row.n;
-      S missing(0);
-      if (row.boundary) {
-        missing = row.reach - n.dot(d);
-      } else {
-        const Vector3<S> r = row.r + d;
-        if (r.squaredNorm() > row.reach * row.reach) {
-          continue;  // far enough, unless squares underflow
-        }
-        const S distance = detail::safeNorm(r);
-        missing = row.reach - distance;
-        if (distance > Eigen::NumTraits<S>::epsilon() * row.reach) {
-          n = detail::safeUnit(r);
-        }
+  Opened open(std::size_t k, bool keepAngularMomentum) {
+    const Row& row = rows_[k];
+    Shift& b1 = shifts_[row.slot1];
+    Shift& b2 = shifts_[row.slot2];
+    const Vector3<S> d = b2.d - b1.d;
+    Vector3<S> n = row.n;
+    S missing(0);
+    S distance(0);
+    if (row.boundary) {
+      missing = row.reach - n.dot(d);
+    } else {
+      const Vector3<S> r = row.r + d;
+      if (r.squaredNorm() > row.reach * row.reach) {
+        return {};  // far enough, unless squares underflow
       }
-      if (!(missing > S(0))) {
-        continue;
-      }
-      largest = std::max<S>(largest, missing);
-      if (row.share1 > S(0)) {  // immovable bodies are shared between threads: never written
-        b1.d -= (row.share1 * missing) * n;
-      }
-      if (row.share2 > S(0)) {
-        b2.d += (row.share2 * missing) * n;
+      distance = detail::safeNorm(r);
+      missing = row.reach - distance;
+      if (distance > Eigen::NumTraits<S>::epsilon() * row.reach) {
+        n = detail::safeUnit(r, distance);
       }
     }
-    return largest;
+    if (!(missing > S(0))) {
+      return {};
+    }
+    Opened opened{missing, S(0)};
+    if (keepAngularMomentum && row.share1 > S(0) && row.share2 > S(0)) {
+      const Vector3<S> v_rel = (b2.v - b1.v) + (b2.dv - b1.dv);
+      const Vector3<S> v_t = v_rel - n.dot(v_rel) * n;
+      const S lost = missing / (distance + missing);  // v_t becomes (1 - lost) v_t
+      b1.dv += (row.share1 * lost) * v_t;
+      b2.dv -= (row.share2 * lost) * v_t;
+      opened.loss = row.share1 * b1.mass * v_t.squaredNorm() * lost * (S(2) - lost) / S(2);
+    }
+    if (row.share1 > S(0)) {  // immovable bodies are shared between threads: never written
+      b1.d -= (row.share1 * missing) * n;
+    }
+    if (row.share2 > S(0)) {
+      b2.d += (row.share2 * missing) * n;
+    }
+    return opened;
   }
 
   std::vector<Shift> shifts_;
   S smallest_ = S(0);  ///< smallest radius of a contact
   std::vector<Row> rows_;
-  std::vector<S> changes_;
   std::vector<Displacement<S>> moved_;
 };
 

@@ -76,6 +76,7 @@ class ContactStage {
   /// the bodies are.
   void separate(Bodies& bodies, const Config& config, const Scalar& time, Profiler& profiler) {
     moved_ = false;
+    separationLoss_ = Scalar(0);
     if (contacts_.empty()) {
       profiler.skip(Phase::Colouring, "no contacts");
       profiler.skip(Phase::PositionalCorrection, "no contacts");
@@ -89,17 +90,18 @@ class ContactStage {
     const Profiler::Scope scope(profiler, Phase::PositionalCorrection);
     CorrectionSettings<Scalar> settings;
     settings.factor = config.positionalCorrectionFactor;
-    solver_.correctPositions(bodies, settings);
+    settings.keepAngularMomentum = domain.isOpen();  // images have none to keep
+    separationLoss_ = solver_.correctPositions(bodies, settings).loss;
     moved_ = !solver_.displacements().empty();
     if (moved_) {
       renewGeometry(bodies, config, time);
     }
   }
 
-  /// Energy that moving bodies apart took, F.d by the forces at the new places [J]: exact to the square of
-  /// the displacement d.
+  /// Energy that moving bodies apart took [J]: F.d by the forces at the new places, exact to the square of
+  /// the displacement d, and what it took of their motion.
   Scalar separationWork(const ForceStage<Scalar, Layout>& force, const Bodies& bodies) const {
-    Scalar work(0);
+    Scalar work = separationLoss_;
     if (moved_) {
       const HillFrame<Scalar> frame(domain);
       for (const Displacement<Scalar>& d : solver_.displacements()) {
@@ -284,6 +286,7 @@ class ContactStage {
   std::vector<ContactKeys> firstHalfKeys_;
   std::vector<ContactImpulse<Scalar>> firstHalf_;
   ContactReport<Scalar> report_;
+  Scalar separationLoss_ = Scalar(0);
   bool moved_ = false;
   bool acted_ = false;     // the last solve changed velocities
   bool coloured_ = false;  // solver_ knows the present contacts
