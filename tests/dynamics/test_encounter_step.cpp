@@ -54,6 +54,7 @@ double slowly(const Bodies<double>& bodies, double G, double softening, const St
 
 }  // namespace
 
+// Seen to fail: the half under the eighth root left out.
 TEST_CASE("A circular orbit of any two bodies is cut into 2 pi / eta steps") {
   for (const double share : {1e-9, 0.3, 0.5}) {
     const auto pair = made(scenes::keplerPair<double>(0.0, share));
@@ -64,6 +65,7 @@ TEST_CASE("A circular orbit of any two bodies is cut into 2 pi / eta steps") {
   CHECK_THAT(double(stepFromEncounters(single, 1.0F, 0.0F, limits)), WithinRel(0.02, 1e-5));
 }
 
+// Seen to fail: v_x of single bodies in place of differences; flying by that counts without gravity.
 TEST_CASE("The step is that of the formula, for any number of points and any softening") {
   for (const std::size_t n : {2U, 3U, 7U, 50U, 128U}) {
     for (const double softening : {0.0, 0.5}) {
@@ -77,6 +79,7 @@ TEST_CASE("The step is that of the formula, for any number of points and any sof
   }
 }
 
+// Seen to fail: v_x of single bodies in place of differences.
 TEST_CASE("A boost and a turn round of all velocities change no step") {
   for (const std::size_t n : {60U, 300U}) {
     const auto rest = cloud(n, 0.01);
@@ -99,6 +102,7 @@ TEST_CASE("A body without acceleration among others is no reason for a short ste
   CHECK(h < 0.02 * std::sqrt(0.5));
 }
 
+// Seen to fail: flying by that counts without gravity.
 TEST_CASE("A fast pass that gravity hardly bends is not resolved, a slow one is") {
   Body<double> one;
   Body<double> two;
@@ -113,6 +117,7 @@ TEST_CASE("A fast pass that gravity hardly bends is not resolved, a slow one is"
   CHECK_THAT(stepAt(100.0), WithinRel(0.02 * std::pow(2.0, 0.125) / 10.0, 1e-6));
 }
 
+// Seen to fail: half a radius for the quarter.
 TEST_CASE("No pair meets deeper than a quarter of the smaller radius, and a distant one is let come") {
   Body<double> one;
   Body<double> two;
@@ -163,6 +168,28 @@ TEST_CASE("Above the limit the likeliest partners give a step near that of all p
   }
 }
 
+// One pair among 200 accelerates, by a: its likeliest partner has the mean mass, 1, at r = sqrt(1/a). Seen to
+// fail: half that distance, which the test above does not notice.
+TEST_CASE("The likeliest partner stands where it alone would cause the acceleration") {
+  for (const double a : {100.0, 4.0}) {
+    std::vector<Body<double>> list(200);
+    for (Body<double>& body : list) {
+      body.mass = 1;
+    }
+    list[0].velocity = {0, 3, 0};
+    list[1].velocity = {0, -3, 0};
+    auto bodies = made(list);
+    bodies[0].acceleration() = Vec(a, 0, 0);
+    bodies[1].acceleration() = Vec(-a, 0, 0);
+    const double r = std::sqrt(1 / a);
+    const double fall = std::pow(r, -1.5);
+    const double fly = 3 / r;
+    const double rate = std::pow(std::pow(fall, 4) * (std::pow(fly, 4) + std::pow(fall, 4)) / 2, 0.125);
+    CHECK_THAT(stepFromEncounters(bodies, 1.0, 0.0, wide), WithinRel(0.02 / rate, 1e-12));
+  }
+}
+
+// Seen to fail: 1/next = 1.9/wanted - 0.9/last.
 TEST_CASE("The reversible step is its own inverse, and the step wanted where that is constant or far") {
   const CounterRandom random(2);
   for (std::uint64_t k = 0; k < 100; ++k) {

@@ -65,6 +65,7 @@ void run(Bodies<S, SoA>& bodies, const HillFrame<S>& frame, S h, int steps, S k)
 
 }  // namespace
 
+// Seen to fail: 1.999 for the 2 of what keeps v_y + 2 Omega x.
 TEMPLATE_TEST_CASE("without other forces the epicycle is exact, whatever the step", "", float, double,
                    long double) {
   using S = TestType;
@@ -103,6 +104,7 @@ TEST_CASE("where the frame hardly turns an epicycle is a straight line") {
 
 // With a spring the exact motion is that of a linear system; many short steps stand in for it. The error at a
 // fixed time falls as h^2, and in proportion of the spring.
+// Seen to fail: the first kick as long as the step.
 TEST_CASE("the symplectic epicycle integrator is of order 2, with errors in proportion of the other forces") {
   const HillFrame<Wide> frame = frameOf<Wide>(1.0, 1.3);
   const auto error = [&](int steps, Wide k) {
@@ -124,6 +126,7 @@ TEST_CASE("the symplectic epicycle integrator is of order 2, with errors in prop
 
 // Hill's equations are the same after t -> -t, y -> -y, v_x -> -v_x, v_z -> -v_z. A spring above 3 Omega^2
 // holds against the tide; with a weaker one distances grow exponentially, and with them what is rounded.
+// Seen to fail: the first kick as long as the step.
 TEST_CASE("a run forward and a mirrored run back end where they began") {
   const HillFrame<double> frame = frameOf<double>(1.0, 1.3);
   Bodies<double, SoA> bodies = some<double>(5);
@@ -147,6 +150,7 @@ TEST_CASE("a run forward and a mirrored run back end where they began") {
 
 // Canonical momenta are v_x, v_y + 2 Omega x, v_z. The map of a step, with a spring, is linear: its columns
 // are the images of unit vectors.
+// Seen to fail: 1.999 for the 2 of what keeps v_y + 2 Omega x.
 TEST_CASE("a step is symplectic") {
   const double omega = 1.0;
   const HillFrame<double> frame = frameOf<double>(omega, 1.3);
@@ -173,6 +177,7 @@ TEST_CASE("a step is symplectic") {
 
 // 1e6 steps: the energy of the epicycle stays within the random walk of its rounding, about 1e-16 sqrt(1e6);
 // a turn by cosine and sine drifts in proportion of the steps.
+// Seen to fail: the same 1.999.
 TEST_CASE("the energy of an epicycle does not drift in a million steps") {
   const HillFrame<double> frame = frameOf<double>(1.0, 1.0);
   const Epicycle<double> epicycle(frame, 0.0123);
@@ -190,6 +195,7 @@ TEST_CASE("the energy of an epicycle does not drift in a million steps") {
 }
 
 // Seen from the inertial frame nothing turns a free body: its spin stays, and its orientation goes on evenly.
+// Seen to fail: the middle shear of the spin the other way round.
 TEST_CASE("spin and orientation of a free body are those of the inertial frame, seen from the turning one") {
   const double omega = 0.9;
   const Epicycle<double> epicycle(frameOf<double>(omega, omega), 0.37);

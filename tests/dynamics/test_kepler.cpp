@@ -36,6 +36,7 @@ State orbitAt(long double e, long double t) {
 
 }  // namespace
 
+// Seen to fail: c_2 of the doubled angle wrong by 5e-8.
 TEST_CASE("Stumpff's functions are sines, cosines and their hyperbolic kin, with no seam") {
   for (const long double z : {1e-6L, 1e-3L, 0.0999L, 0.1001L, 0.39L, 0.41L, 3.0L, 30.0L}) {
     const long double s = std::sqrt(z);
@@ -56,6 +57,8 @@ TEST_CASE("Stumpff's functions are sines, cosines and their hyperbolic kin, with
 // From anywhere on any orbit to anywhere, against Kepler's equation in long double. The orbit carries the
 // rounding of the start, some 1e-16 in each number, to the end: linearly in time, and at e near 1 by the
 // steep way through pericentre.
+// Seen to fail: the bracket of an ellipse backwards as that forwards; iteration that ends at 1e6 units of
+// rounding.
 TEST_CASE("Orbits of every eccentricity are followed from anywhere over any time, forwards and back") {
   double worst = 0;
   for (const double e : {0.0, 0.1, 0.5, 0.9, 0.99, 0.999, 1.001, 1.1, 2.0, 10.0}) {
@@ -94,6 +97,7 @@ TEST_CASE("Orbits of every eccentricity are followed from anywhere over any time
   CHECK(worst > 0);
 }
 
+// Seen to fail: c_2 of the doubled angle wrong by 5e-8.
 TEST_CASE("A parabola, and a fall along a line, are orbits as well") {
   // Parabola with pericentre 1: x = 1 - D^2/2 … with t = sqrt(2) (D + D^3/3) for GM = 1.
   for (const double D : {0.5, 2.0, 10.0}) {

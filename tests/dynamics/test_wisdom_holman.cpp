@@ -64,6 +64,8 @@ S worst(S share, S h) {
 
 }  // namespace
 
+// Seen to fail: shares of half a planet's mass too much; the orbit about the mass inside alone, without the
+// planet's.
 TEST_CASE("A single planet of any mass is exact, however long the step") {
   for (const double share : {1e-3, 0.3}) {
     for (const double e : {0.2, 0.9}) {
@@ -80,6 +82,7 @@ TEST_CASE("A single planet of any mass is exact, however long the step") {
 }
 
 // Two-sided in both: h^2, and the planets' masses.
+// Seen to fail: the first kick as long as the step; the orbit about the mass inside alone.
 TEST_CASE("The error is of second order in the step and of first in the planets' masses") {
   const long double coarse = worst(1.0L, 200.0L);
   const long double fine = worst(1.0L, 100.0L);
@@ -106,6 +109,7 @@ TEST_CASE("The outer solar system in steps of 200 days errs by 4e-6, and without
   CHECK_THAT(last, WithinRel(first, 0.2));
 }
 
+// Seen to fail: the first kick as long as the step.
 TEST_CASE("Velocities turned round lead back to the start") {
   System<double> system(outer<double>(1.0), scenes::outerSolarSystemG);
   const Bodies<double> start = system.bodies;
@@ -119,6 +123,7 @@ TEST_CASE("Velocities turned round lead back to the start") {
   }
 }
 
+// Seen to fail: shares of half a planet's mass too much.
 TEST_CASE("Momentum and angular momentum are kept to rounding, and the centre of mass goes straight on") {
   auto list = outer<double>(1.0);
   for (Body<double>& body : list) {
@@ -144,6 +149,7 @@ TEST_CASE("Momentum and angular momentum are kept to rounding, and the centre of
   CHECK((after[2] - before[2] - 2e5 * before[0]).norm() < 1e-9);
 }
 
+// Seen to fail: the first body as the centre.
 TEST_CASE("The heaviest body is the centre wherever it stands, and what has none is refused") {
   auto list = outer<double>(1.0);
   System<double> first(list, scenes::outerSolarSystemG);
