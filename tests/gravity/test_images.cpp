@@ -284,7 +284,8 @@ TEST_CASE("Softening acts on near images as on the bodies themselves") {
   const auto law = [&](const Wide& r) {
     LatticeForce force = ewald(r, cube.cast<long double>());
     for (int i = 0; i < 125; ++i) {
-      const Wide d = r + Wide(i % 5 - 2, i / 5 % 5 - 2, i / 25 - 2);
+      const std::array<int, 3> image{i % 5 - 2, i / 5 % 5 - 2, i / 25 - 2};
+      const Wide d = r + Wide(image[0], image[1], image[2]);
       const long double s = d.squaredNorm() + static_cast<long double>(softening * softening);
       if (d.norm() > 0) {
         force.acceleration += d / std::pow(d.norm(), 3) - d / (s * std::sqrt(s));

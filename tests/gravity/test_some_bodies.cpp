@@ -3,6 +3,8 @@
 #include "support/threads.hpp"
 #include <gravel/gravity/gravity_solver.hpp>
 
+#include <numeric>
+
 // Accelerations of some bodies only, and bodies that only feel.
 
 using namespace gravel;
@@ -56,10 +58,8 @@ TEST_CASE("None of the bodies, all of them, and numbers that no body has") {
         solver.accelerationsOf(bad, points.positions, points.masses, 1.0, 0.0, out),
         ContainsSubstring("number of a body in a gravity sum is 50") && ContainsSubstring("below"));
     CHECK(out == std::vector<Vec>(50, untouched));
-    std::vector<int> every;
-    for (int i = 0; i < 50; ++i) {
-      every.push_back(i);
-    }
+    std::vector<int> every(50);
+    std::iota(every.begin(), every.end(), 0);
     std::vector<Vec> all(50);
     solver.accelerations(points.positions, points.masses, 1.0, 0.0, all);
     solver.accelerationsOf(every, points.positions, points.masses, 1.0, 0.0, out);

@@ -59,7 +59,7 @@ Vec momentum(const Space<double>& space) {
 }  // namespace
 
 TEST_CASE("In a periodic box gravity keeps momentum, and energy to second order in the step") {
-  double errors[2];
+  std::array<double, 2> errors{};
   for (const std::size_t k : {0U, 1U}) {
     Space<double> space = inBox(k == 0 ? 0.02 : 0.01);
     const Vec p = momentum(space);
@@ -91,7 +91,8 @@ TEST_CASE("A plane wave in a cold lattice grows at Jeans' rate") {
   const double size = 1e-4;
   const auto wave = [](double x) { return std::sin(2 * pi<double>() * x); };
   for (int i = 0; i < side * side * side; ++i) {
-    const Vec place = Vec(i % side, i / side % side, i / (side * side)) / side - Vec(0.5, 0.5, 0.5);
+    const std::array<int, 3> cell{i % side, i / side % side, i / (side * side)};
+    const Vec place = Vec(cell[0], cell[1], cell[2]) / side - Vec(0.5, 0.5, 0.5);
     Body<double> body = ball(place, Vec::Zero(), 0.0, 1.0 / (side * side * side));
     body.position[0] += size * wave(place[0]);
     space.addBody(body);

@@ -145,7 +145,8 @@ struct Expansion {
 
   /// Where the moment (a, b, c) stands.
   static constexpr std::size_t indexOf(int a, int b, int c) {
-    return static_cast<std::size_t>(M::row(a + b + c, c) + b);
+    const int index = M::row(a + b + c, c) + b;
+    return static_cast<std::size_t>(index);
   }
 
   /// The coefficients of a local expansion in the rows of derivatives.
