@@ -137,7 +137,7 @@ class Gravel {
     config.coeffRestitution = scene.e;
     config.coeffFriction = config.coeffStaticFriction = scene.mu;
     config.contactTolerance = 1e-2;
-    config.contactIterations = 3;
+    config.contactIterations = 4;
     return config;
   }
 
