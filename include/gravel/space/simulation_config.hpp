@@ -68,8 +68,9 @@ struct EnumNames;
 template <>
 struct EnumNames<IntegratorKind> {
   static constexpr std::array<std::string_view, 13> values{
-      "VelocityVerlet", "Yoshida4", "Yoshida6",       "Yoshida8",           "BlanesMoan4",  "BlanesMoan6",
-      "KahanLi6",       "KahanLi8", "ForceGradient4", "SymplecticEpicycle", "GaussRadau15", "WisdomHolman", "Hermite4"};
+      "VelocityVerlet", "Yoshida4",     "Yoshida6", "Yoshida8",       "BlanesMoan4",
+      "BlanesMoan6",    "KahanLi6",     "KahanLi8", "ForceGradient4", "SymplecticEpicycle",
+      "GaussRadau15",   "WisdomHolman", "Hermite4"};
 };
 template <>
 struct EnumNames<GravityKind> {
