@@ -218,8 +218,9 @@ class Space : public Settings<Scalar> {
   Material<Scalar> pairMaterial(const CollisionContext& ctx) const;
   Scalar bindingEnergy(std::size_t i, const Scalar& time) const;
   std::vector<std::pair<BodyId, BodyId>> decideCollisions();
-  void mergeCollided(const std::vector<std::pair<BodyId, BodyId>>& merges);
-  void merge(BodyId stays, BodyId goes);
+  void decideTouching();
+  void mergeCollided(const std::vector<std::pair<BodyId, BodyId>>& merges, const Scalar& time);
+  void merge(BodyId stays, BodyId goes, const Scalar& time);
   Scalar pairEnergy(std::size_t i, std::size_t j, const Scalar& time) const;
   Scalar potentialEnergy() const;
   template <class Change>

@@ -33,10 +33,29 @@ auto Space<Scalar, Layout>::decideCollisions() -> std::vector<std::pair<BodyId, 
   return merges;
 }
 
+/// Bodies that touch and approach where a step begins anew, since nothing has met them on their way.
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::decideTouching() {
+  if (!contact_.collisionHook) {
+    return;
+  }
+  const ContactOutcomes<Scalar> starts = decideContacts<Scalar>(
+      contact_.contacts(), bodies_, contact_.collisionHook, time_,
+      std::max<Scalar>(this->config_.restitutionThreshold, this->config_.epsilon), dt_);
+  left_.restitution += starts.restitutionLoss;
+  left_.friction += starts.frictionLoss;
+  std::vector<std::pair<BodyId, BodyId>> merges;
+  for (const auto& [id1, id2] : starts.merges) {
+    merges.emplace_back(BodyId{id1}, BodyId{id2});
+  }
+  mergeCollided(merges, time_);
+}
+
 /// One after the other. Of two, the fixed one stays, else the heavier, else the one of the smaller id; a
 /// third that meets the one that went meets the one that stayed.
 template <Real Scalar, class Layout>
-void Space<Scalar, Layout>::mergeCollided(const std::vector<std::pair<BodyId, BodyId>>& merges) {
+void Space<Scalar, Layout>::mergeCollided(const std::vector<std::pair<BodyId, BodyId>>& merges,
+                                          const Scalar& time) {
   if (merges.empty()) {
     return;
   }
@@ -65,14 +84,14 @@ void Space<Scalar, Layout>::mergeCollided(const std::vector<std::pair<BodyId, Bo
       std::swap(stays, goes);
     }
     heir.emplace(toInteger(goes), stays);
-    merge(stays, goes);
+    merge(stays, goes, time);
   }
   contact_.forgetContacts();
   forcesValid_ = false;
 }
 
 template <Real Scalar, class Layout>
-void Space<Scalar, Layout>::merge(BodyId stays, BodyId goes) {
+void Space<Scalar, Layout>::merge(BodyId stays, BodyId goes, const Scalar& time) {
   const std::size_t i = bodies_.indexOf(stays);
   const std::size_t j = bodies_.indexOf(goes);
   const auto motionOf = [&](std::size_t k) {
@@ -85,7 +104,6 @@ void Space<Scalar, Layout>::merge(BodyId stays, BodyId goes) {
   const Body<Scalar> b = bodies_[j].load();
   Vector r_ab = b.position - a.position;
   Vector v_ab = b.velocity - a.velocity;
-  const Scalar time = time_ + previous_dt_;
   contact_.domain.minimumImage(r_ab, v_ab, time);
   const Scalar motion = motionOf(i) + motionOf(j);
   const Scalar energy = bindingEnergy(i, time) + bindingEnergy(j, time) - pairEnergy(i, j, time);

@@ -113,7 +113,7 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration) {
     left_.restitution += contact_.report().restitutionLoss;
     left_.friction += contact_.report().frictionLoss;
     left_.work -= contact_.report().driftWork;
-    mergeCollided(merges);
+    mergeCollided(merges, Scalar(time_ + h));
     applyDamping();
     if (force_.hook) {
       hookPower_ = force_.hookPower(bodies_);
@@ -138,13 +138,14 @@ void Space<Scalar, Layout>::prepare() {
   bodies_.validateAll();
   contact_.materials.check(bodies_);
   orbits_.check(this->config_.integrator, bodies_, contact_, force_);
-  if (!forcesValid_ || placesChanged()) {
+  while (!forcesValid_ || placesChanged()) {
     applyGravity();
     buildCollisionGraph();
     rememberPlaces();
     hookPower_ = force_.hookPower(bodies_);
     stepGoesOn_ = false;
     updateAdaptiveTimeStep();
+    decideTouching();
   }
 }
 
