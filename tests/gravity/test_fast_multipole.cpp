@@ -64,18 +64,6 @@ Errors errors(const PointMasses<S>& points, const std::vector<Vector3<S>>& a, lo
           static_cast<double>(worst)};
 }
 
-template <class S>
-double imbalance(const PointMasses<S>& points, const std::vector<Vector3<S>>& a) {
-  Wide total = Wide::Zero();
-  long double scale = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Wide f = static_cast<long double>(points.masses[i]) * a[i].template cast<long double>();
-    total += f;
-    scale += f.norm();
-  }
-  return static_cast<double>(total.norm() / scale);
-}
-
 }  // namespace
 
 // The total force was seen to fail where a pair of cells is judged from the side of the source alone.

@@ -52,18 +52,6 @@ double error(const std::vector<Vector3<S>>& a, const std::vector<Exact>& exact) 
   return static_cast<double>(std::sqrt(squares / scale));
 }
 
-template <class S>
-double imbalance(const PointMasses<S>& points, const std::vector<Vector3<S>>& a) {
-  Wide total = Wide::Zero();
-  long double scale = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Wide f = static_cast<long double>(points.masses[i]) * a[i].template cast<long double>();
-    total += f;
-    scale += f.norm();
-  }
-  return static_cast<double>(total.norm() / scale);
-}
-
 DirectSum<double> direct(const Domain<double>& domain, double time = 0, double tolerance = 1e-10) {
   DirectSum<double> sum;
   sum.setDomain(domain, time);

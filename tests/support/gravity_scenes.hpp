@@ -47,4 +47,18 @@ PointMasses<S> gravityScene(const std::string& name, std::size_t n, std::uint64_
   return points;
 }
 
+/// Total force over the sum of the forces' sizes.
+template <class S>
+double imbalance(const PointMasses<S>& points, const std::vector<Vector3<S>>& a) {
+  Vector3<long double> total = Vector3<long double>::Zero();
+  long double scale = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vector3<long double> f =
+        static_cast<long double>(points.masses[i]) * a[i].template cast<long double>();
+    total += f;
+    scale += f.norm();
+  }
+  return static_cast<double>(total.norm() / scale);
+}
+
 }  // namespace gravel::test
