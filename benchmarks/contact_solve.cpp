@@ -63,6 +63,9 @@ const Scene& packing() {
     const S side = std::cbrt(static_cast<S>(count) * 0.5236 / 0.6);
     s.walls = {{{0, 0, 1}, 0, {}},      {{0, 0, -1}, -side, {}}, {{1, 0, 0}, 0, {}},
                {{-1, 0, 0}, -side, {}}, {{0, 1, 0}, 0, {}},      {{0, -1, 0}, -side, {}}};
+    for (std::size_t b = 0; b < s.walls.size(); ++b) {
+      s.walls[b].number = b;
+    }
     const CounterRandom random(1);
     for (std::size_t i = 0; i < count; ++i) {
       Body<S> body;
