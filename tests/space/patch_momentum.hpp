@@ -2,6 +2,7 @@
 
 #include <gravel/space/space.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -41,6 +42,18 @@ inline PatchMomentum followMomentum(Space<double>& space, std::size_t steps) {
   }
   followed.error += momentumAlong(space);
   return followed;
+}
+
+/// Largest difference of a place or a velocity between the same bodies of two runs, through nearest images.
+inline double largestDifference(const Space<double>& one, const Space<double>& two) {
+  double worst = 0.0;
+  for (std::size_t i = 0; i < one.n(); ++i) {
+    Vector3<double> r = one.body(i).position() - two.body(i).position();
+    Vector3<double> v = one.body(i).velocity() - two.body(i).velocity();
+    one.domain().minimumImage(r, v, one.time());
+    worst = std::max({worst, r.norm(), v.norm()});
+  }
+  return worst;
 }
 
 }  // namespace gravel::test
