@@ -146,7 +146,8 @@ TEST_CASE("float keeps tolerances down to 3e-6, long double down to 1e-12") {
   }
 }
 
-TEMPLATE_TEST_CASE("the same bits for 1, 2, 3 and 8 threads, and for a used object", "", float, double) {
+TEMPLATE_TEST_CASE("the same bits for 1, 2, 3 and 8 threads, and for a used object", "",
+                   GRAVEL_TEST_TYPES(double, float)) {
   using S = TestType;
   auto points = gravityScene<S>("Plummer sphere", 3000);
   for (std::size_t i = 0; i < points.size(); i += 5) {
@@ -243,7 +244,8 @@ TEST_CASE("two clusters a million radii apart, and one body a billion times heav
   CHECK(imbalance(heavy, a) <= 1e-14);
 }
 
-TEMPLATE_TEST_CASE("other units change the result by rounding at most", "", float, double) {
+TEMPLATE_TEST_CASE("other units change the result by rounding at most", "",
+                   GRAVEL_TEST_TYPES(double, float)) {
   using S = TestType;
   const auto points = gravityScene<S>("rubble pile", 500);
   PointMasses<S> other = points;

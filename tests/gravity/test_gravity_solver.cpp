@@ -5,7 +5,8 @@
 using namespace gravel;
 using namespace gravel::test;
 
-TEMPLATE_TEST_CASE("the solver gives the bits of the method that it names", "", float, double, long double) {
+TEMPLATE_TEST_CASE("the solver gives the bits of the method that it names", "",
+                   GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
   const auto points = randomMasses<S>(100, 80);
   for (const GravityKind kind : {GravityKind::Automatic, GravityKind::Direct, GravityKind::FastMultipole}) {

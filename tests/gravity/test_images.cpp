@@ -291,7 +291,8 @@ TEST_CASE("Softening acts on near images as on the bodies themselves") {
   CHECK(error(accelerations(cells, points, softening), exact.accelerations) < 1e-5);
 }
 
-TEMPLATE_TEST_CASE("Images pull bodies of every scalar", "", float, long double, MinimalReal) {
+TEMPLATE_TEST_CASE("Images pull bodies of every scalar", "",
+                   GRAVEL_TEST_TYPES(long double, float, MinimalReal)) {
   using S = TestType;
   const auto points = inBox<double>(40, brick);
   PointMasses<S> own;

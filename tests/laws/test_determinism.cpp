@@ -49,14 +49,6 @@ Space<double, Layout> spaceOf(const std::vector<Body<double>>& bodies,
 
 #ifdef _OPENMP
 
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
-#define GRAVEL_TEST_SLOW
-#elif defined(__has_feature)
-#if __has_feature(thread_sanitizer) || __has_feature(address_sanitizer)
-#define GRAVEL_TEST_SLOW
-#endif
-#endif
-
 // Enough bodies and contacts for many chunks of every loop that is shared.
 // Seen to fail: orderedSum with as many chunks as there are threads.
 TEST_CASE("Gravity, contacts and friction are the same bits for 1, 2, 3 and 8 threads") {

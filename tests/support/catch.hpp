@@ -17,6 +17,22 @@
 
 #include <string>
 
+/// Defined where a sanitizer makes programs an order of magnitude slower, to run and to compile.
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+#define GRAVEL_TEST_SLOW
+#elif defined(__has_feature)
+#if __has_feature(thread_sanitizer) || __has_feature(address_sanitizer)
+#define GRAVEL_TEST_SLOW
+#endif
+#endif
+
+/// Types of a TEMPLATE_TEST_CASE: all of them, or the first alone where that is slow.
+#ifdef GRAVEL_TEST_SLOW
+#define GRAVEL_TEST_TYPES(first, ...) first
+#else
+#define GRAVEL_TEST_TYPES(first, ...) first, __VA_ARGS__
+#endif
+
 namespace gravel::test {
 
 using Catch::Matchers::WithinAbs;
