@@ -21,9 +21,10 @@ namespace gravel {
 
 template <Real Scalar>
 struct StepLimits {
-  Scalar factor = Scalar(0.02);  ///< eta [1]; 2 pi / eta steps per circular orbit
-  Scalar smallest = Scalar(0);   ///< [s]
-  Scalar largest = Scalar(1);    ///< [s]
+  Scalar factor = Scalar(0.02);     ///< eta [1]; 2 pi / eta steps per circular orbit
+  Scalar smallest = Scalar(0);      ///< [s]
+  Scalar largest = Scalar(1);       ///< [s]
+  Scalar contactSteps = Scalar(1);  ///< contact steps in one step: only these must be short against radii
 };
 
 namespace detail {
@@ -95,7 +96,7 @@ Scalar stepFromMotion(const Bodies<Scalar, Layout>& bodies, const Scalar& soften
       tau = std::min<Scalar>(tau, sqrt(v_sq + a * l) / a);
     }
     if (r > Scalar(0) && v_sq > Scalar(0)) {
-      tau = std::min<Scalar>(tau, r / (Scalar(4) * limits.factor * sqrt(v_sq)));
+      tau = std::min<Scalar>(tau, limits.contactSteps * r / (Scalar(4) * limits.factor * sqrt(v_sq)));
     }
     return tau;
   });

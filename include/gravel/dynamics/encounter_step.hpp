@@ -151,7 +151,7 @@ Scalar stepFromEncounters(const Bodies<Scalar, Layout>& bodies, const Scalar& G,
   }
   S h = S(limits.largest) / detail::eighthRoot(S(S(1) + sum));
   if (approach > S(0)) {
-    h = std::min<S>(h, T / sqrt(approach));
+    h = std::min<S>(h, S(limits.contactSteps) * T / sqrt(approach));
   }
   return std::clamp<Scalar>(Scalar(h), std::max<Scalar>(limits.smallest, limits.largest * Scalar(1e-12)),
                             limits.largest);

@@ -15,6 +15,7 @@
 #include <gravel/space/force_stage.hpp>
 #include <gravel/space/material_table.hpp>
 #include <gravel/space/simulation_config.hpp>
+#include <gravel/space/step_record.hpp>
 #include <gravel/spatial/neighbour_list.hpp>
 
 namespace gravel {
@@ -56,7 +57,7 @@ class ContactStage {
   void strike(Bodies& bodies, const Config& config, const HillFrame<Scalar>& frame, const Scalar& time,
               const Scalar& h, Profiler& profiler);
 
-  /// Pairs of ids that a user lets merge after impacts inside the last step.
+  /// Pairs of ids that a user lets merge after impacts inside the last part of the step.
   const std::vector<std::pair<std::uint64_t, std::uint64_t>>& merges() const { return impacts_.merges(); }
 
   /// Pairs that touched in the last step: contacts at its end, and impacts of others.
@@ -70,7 +71,9 @@ class ContactStage {
   Touches allTouches() const;
 
   /// The blows inside the last step, in the order in which they were dealt.
-  const std::vector<Impact<Scalar>>& impacts() const { return impacts_.impacts(); }
+  const std::vector<Impact<Scalar>>& impacts() const {
+    return record_.hasParts() ? record_.impacts() : impacts_.impacts();
+  }
 
   /// Shrinks overlaps by moving bodies, and renews the geometry of the contacts, so that impulses act where
   /// the bodies are.
@@ -156,9 +159,21 @@ class ContactStage {
   /// A new step: its report starts empty.
   void beginStep() {
     report_ = {};
-    firstHalf_.clear();
-    firstHalfKeys_.clear();
+    record_.clear();
     impacts_.clear();
+  }
+
+  /// A part of the step is over that began `start` [s] after it. \param last  no other one follows
+  void endPart(const Scalar& start, bool last) {
+    if (!last) {
+      record_.endPart(impacts_.impacts(), start);
+      if (acted_) {
+        record_.add(contacts_, solver_.impulses());
+      }
+      impacts_.clear();
+    } else if (record_.hasParts()) {
+      record_.addImpacts(impacts_.impacts(), start);
+    }
   }
 
   /// The first half of the step is solved: its impulses are kept for impulses().
@@ -166,12 +181,7 @@ class ContactStage {
   void endFirstHalf(const ForceStage<Scalar, Layout>& force, const Bodies& bodies, const Scalar& kick) {
     if (acted_) {
       bookKick(force, bodies, kick);
-      firstHalf_.clear();
-      firstHalfKeys_.clear();
-      for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        firstHalfKeys_.push_back({contacts_[k].key1, contacts_[k].key2});
-      }
-      firstHalf_.assign(solver_.impulses().begin(), solver_.impulses().end());
+      record_.add(contacts_, solver_.impulses());
     }
   }
 
@@ -187,25 +197,9 @@ class ContactStage {
     moved_ = false;
   }
 
-  /// Impulses of both halves of the step [N s], in the order of contacts(). A contact that ended in the drift
-  /// is not among them. O(contacts).
-  std::vector<ContactImpulse<Scalar>> impulses() const {
-    std::vector<ContactImpulse<Scalar>> sum;
-    std::size_t m = 0;
-    for (std::size_t k = 0; k < contacts_.size(); ++k) {
-      sum.push_back(k < solver_.impulses().size() ? solver_.impulses()[k] : ContactImpulse<Scalar>{});
-      const ContactKeys keys{contacts_[k].key1, contacts_[k].key2};
-      while (m < firstHalf_.size() && firstHalfKeys_[m] < keys) {
-        ++m;
-      }
-      if (m < firstHalf_.size() && firstHalfKeys_[m] == keys) {
-        sum.back().normal += firstHalf_[m].normal;
-        sum.back().tangential += firstHalf_[m].tangential;
-        sum.back().turning += firstHalf_[m].turning;
-      }
-    }
-    return sum;
-  }
+  /// Impulses of all solves of the step [N s], in the order of contacts(). A contact that ended in a drift is
+  /// not among them. O(contacts).
+  std::vector<ContactImpulse<Scalar>> impulses() const { return record_.sum(contacts_, solver_.impulses()); }
 
   void save(SnapshotWriter& out) const;
   /// \throws std::runtime_error, std::invalid_argument if the file does not hold what save() writes
@@ -283,8 +277,7 @@ class ContactStage {
   bool searched_ = false;      // neighbours_ hold for the whole drift
   std::vector<Contact<Scalar>> contacts_;
   ContactSolver<Scalar> solver_;
-  std::vector<ContactKeys> firstHalfKeys_;
-  std::vector<ContactImpulse<Scalar>> firstHalf_;
+  StepRecord<Scalar> record_;
   ContactReport<Scalar> report_;
   Scalar separationLoss_ = Scalar(0);
   bool moved_ = false;

@@ -67,7 +67,7 @@ template <Real Scalar, class Layout>
 std::size_t ContactStage<Scalar, Layout>::touches() const {
   std::size_t count = contacts_.size();
   struck_.clear();
-  for (const Impact<Scalar>& impact : impacts_.impacts()) {
+  for (const Impact<Scalar>& impact : impacts()) {
     struck_.push_back({impact.key1, impact.key2});
   }
   std::sort(struck_.begin(), struck_.end());
@@ -83,7 +83,7 @@ std::size_t ContactStage<Scalar, Layout>::touches() const {
 template <Real Scalar, class Layout>
 auto ContactStage<Scalar, Layout>::allTouches() const -> Touches {
   Touches all{contacts_, impulses()};
-  for (const Impact<Scalar>& impact : impacts_.impacts()) {
+  for (const Impact<Scalar>& impact : impacts()) {
     Contact<Scalar> c{};
     c.first = impact.first;
     c.second = impact.second;

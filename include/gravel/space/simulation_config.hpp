@@ -46,6 +46,7 @@ struct SimulationConfig {
   Scalar positionalCorrectionFactor = Scalar(0.4);  ///< share of each overlap removed per step
   Scalar contactTolerance = Scalar(1e-6);  ///< contact sweeps end when speeds change by less, relative
   std::size_t contactIterations = 200;     ///< most contact sweeps per step
+  std::size_t contactSubsteps = 1;         ///< contact steps per force evaluation; 0: as motion asks
   BroadPhaseKind broadPhase = BroadPhaseKind::Automatic;
   bool diagnosticsEnabled = false;  ///< log energies and warn of instability
   std::size_t logFrequency = 100;   ///< steps between two lines of that log
@@ -121,6 +122,7 @@ void forEachSetting(Config& c, Visitor&& visit) {
   visit(S{"positionalCorrectionFactor", "1", unit}, c.positionalCorrectionFactor);
   visit(S{"contactTolerance", "1", tolerance}, c.contactTolerance);
   visit(S{"contactIterations", "1", any}, c.contactIterations);
+  visit(S{"contactSubsteps", "1", any}, c.contactSubsteps);
   visit(S{"broadPhase", "", any}, c.broadPhase);
   visit(S{"diagnosticsEnabled", "", any}, c.diagnosticsEnabled);
   visit(S{"logFrequency", "1", any}, c.logFrequency);
@@ -148,6 +150,12 @@ void SimulationConfig<Scalar>::validate() const {
   }
   if (contactIterations == 0) {
     fault("contactIterations", "0", ">= 1");
+  }
+  if (contactSubsteps != 1 && integrator != IntegratorKind::VelocityVerlet &&
+      integrator != IntegratorKind::SymplecticEpicycle) {
+    fault("contactSubsteps", std::to_string(contactSubsteps),
+          std::string("1 with ") + traitsOf(integrator).name +
+              "; others need one drift a step, VelocityVerlet or SymplecticEpicycle");
   }
   if (logFrequency == 0) {
     fault("logFrequency", "0", ">= 1");

@@ -125,6 +125,8 @@ class Space : public Settings<Scalar> {
   /// The next step; where steps adapt, also the longest one from now on.
   void setTimeStep(Scalar dt);
   Scalar getPreviousTimeStep() const { return previous_dt_; }
+  /// Parts of the last step, each with its own contacts: config().contactSubsteps, or what was chosen.
+  std::size_t contactSubsteps() const { return parts_; }
 
   Scalar getG() const { return this->config_.G; }
   void setG(Scalar g);
@@ -212,12 +214,14 @@ class Space : public Settings<Scalar> {
   void applyDamping();
 
   void step(Scalar h, std::size_t iteration);
+  std::size_t chooseParts(const Scalar& h) const;
+  void advance(const Scalar& h, std::size_t part, std::size_t parts);
   void prepare();
   void rememberPlaces();
   bool placesChanged() const;
   Material<Scalar> pairMaterial(const CollisionContext& ctx) const;
   Scalar bindingEnergy(std::size_t i, const Scalar& time) const;
-  std::vector<std::pair<BodyId, BodyId>> decideCollisions();
+  std::vector<std::pair<BodyId, BodyId>> decideCollisions(const Scalar& time);
   void decideTouching();
   void mergeCollided(const std::vector<std::pair<BodyId, BodyId>>& merges, const Scalar& time);
   void merge(BodyId stays, BodyId goes, const Scalar& time);
@@ -238,6 +242,8 @@ class Space : public Settings<Scalar> {
   Scalar dt_ = Scalar(0);
   bool stepGoesOn_ = false;  // the last step was smooth: the next one is chosen by it, reversibly
   Scalar previous_dt_ = Scalar(0);
+  Scalar contact_dt_ = Scalar(0);  // of the last part of it
+  std::size_t parts_ = 1;
   Scalar time_ = Scalar(0);
   Scalar timeRest_ = Scalar(0);  // what time_ lost to rounding (Kahan 1965)
   std::size_t steps_ = 0;
@@ -261,3 +267,4 @@ class Space : public Settings<Scalar> {
 #include <gravel/space/space_setup.hpp>
 #include <gravel/space/space_state.hpp>
 #include <gravel/space/space_step.hpp>
+#include <gravel/space/space_substeps.hpp>

@@ -10,10 +10,10 @@
 
 namespace gravel {
 
-/// Pairs that shall merge after this step: those of the impacts inside it in their order, then contacts at
-/// its end.
+/// Pairs that shall merge after this part of a step: those of the impacts inside it in their order, then
+/// contacts at its end, `time`.
 template <Real Scalar, class Layout>
-auto Space<Scalar, Layout>::decideCollisions() -> std::vector<std::pair<BodyId, BodyId>> {
+auto Space<Scalar, Layout>::decideCollisions(const Scalar& time) -> std::vector<std::pair<BodyId, BodyId>> {
   std::vector<std::pair<BodyId, BodyId>> merges;
   if (!contact_.collisionHook) {
     return merges;
@@ -22,9 +22,9 @@ auto Space<Scalar, Layout>::decideCollisions() -> std::vector<std::pair<BodyId, 
     merges.emplace_back(BodyId{id1}, BodyId{id2});
   }
   const SimulationConfig<Scalar>& c = this->config_;
-  const ContactOutcomes<Scalar> ends = decideContacts<Scalar>(
-      contact_.contacts(), bodies_, contact_.collisionHook, Scalar(time_ + previous_dt_),
-      std::max(c.restitutionThreshold, c.epsilon), previous_dt_, contact_.merges());
+  const ContactOutcomes<Scalar> ends =
+      decideContacts<Scalar>(contact_.contacts(), bodies_, contact_.collisionHook, time,
+                             std::max(c.restitutionThreshold, c.epsilon), contact_dt_, contact_.merges());
   for (const auto& [id1, id2] : ends.merges) {
     merges.emplace_back(BodyId{id1}, BodyId{id2});
   }

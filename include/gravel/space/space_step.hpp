@@ -3,7 +3,8 @@
 /// \file
 /// Members of `Space` that make a step.
 ///
-/// Order of a step of length h, with a(x) the acceleration of the last evaluation:
+/// Order of a step of length h (in parts: space_substeps.hpp), with a(x) the acceleration of the last
+/// evaluation:
 ///   1. half a kick by the integrator's table; contacts of the last step are solved together, so that what
 ///      rests on something does not sink in the drift; impacts on the way are dealt at their own times;
 ///      drift;
@@ -17,8 +18,8 @@
 /// rolling and sliding are of second order in h, and a body at rest has velocity zero. A single solve at the
 /// end of the step lets piles sink by g h^2/2 and be lifted again every step, which spins a rolling pile up.
 
-#include <gravel/dynamics/epicycle.hpp>
 #include <gravel/space/space.hpp>
+#include <gravel/space/space_substeps.hpp>
 
 namespace gravel {
 
@@ -52,68 +53,20 @@ void Space<Scalar, Layout>::advanceTo(Scalar time) {
   }
 }
 
-/// Between the first kick and the drift: the contacts that the last step left, and the impacts on the way.
-template <Real Scalar, class Layout>
-struct Space<Scalar, Layout>::Departure {
-  Space* space;
-  Scalar h;
-  explicit operator bool() const { return true; }
-  void operator()(const Scalar& kick) const {
-    if (!space->contacts().empty()) {
-      space->resolveCollisions();
-      space->contact_.endFirstHalf(space->force_, space->bodies_, kick);
-    }
-    const HillFrame<Scalar> frame(space->contact_.domain);
-    if (frame.turns() || traitsOf(space->config_.integrator).forceEvaluations == 1) {  // one drift
-      space->contact_.strike(space->bodies_, space->config_, frame, space->time_, h, space->profiler_);
-    }
-  }
-};
-
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration) {
   const Profiler::Step timing(profiler_);
   if (!bodies_.empty()) {
     ledgerOpen_ = true;
     previous_dt_ = h;
-    const auto forces = [&](const Scalar& passed) {
-      force_.evaluate(bodies_, getG(), this->config_.softening, contact_.domain, Scalar(time_ + passed),
-                      profiler_);
-    };
     contact_.beginStep();
-    const Departure departure{this, h};
-    const auto arrival = [&] {
-      contact_.boundaries.advance(h);
-      left_.work -= contact_.wrap(bodies_, Scalar(time_ + h));
-      contact_.detect(bodies_, this->config_, Scalar(time_ + h), h, true, profiler_);
-      contact_.separate(bodies_, this->config_, Scalar(time_ + h), profiler_);
-    };
-    {
-      const Profiler::Scope scope(profiler_, Phase::Integration);
-      const HillFrame<Scalar> frame(contact_.domain);
-      if (orbits_.moves(this->config_.integrator)) {
-        orbits_.advance(this->config_, bodies_, h, force_, forces);
-      } else if (frame.turns()) {
-        integrateEpicycle(frame, bodies_, h, force_.hasTorques(), forces, arrival, departure);
-      } else {
-        // Without mutual gravity runs are not long orbits, and nothing is carried.
-        const bool carry = this->config_.compensatedSummation && !(getG() == Scalar(0));
-        integrate(this->config_.integrator, bodies_, h, force_.hasTorques(), forces, arrival, departure,
-                  carry ? &lost_ : nullptr);
-      }
+    parts_ = chooseParts(h);
+    for (std::size_t part = 0; part < parts_; ++part) {
+      advance(h, part, parts_);
     }
-    rememberPlaces();
-    left_.correction += contact_.separationWork(force_, bodies_);
-    if (force_.hook) {
-      const Scalar power = force_.hookPower(bodies_);
-      left_.work -= (hookPower_ + power) * h / Scalar(2);
-    }
-    const std::vector<std::pair<BodyId, BodyId>> merges = decideCollisions();
-    resolveCollisions();
     left_.restitution += contact_.report().restitutionLoss;
     left_.friction += contact_.report().frictionLoss;
     left_.work -= contact_.report().driftWork;
-    mergeCollided(merges, Scalar(time_ + h));
     applyDamping();
     if (force_.hook) {
       hookPower_ = force_.hookPower(bodies_);
@@ -190,7 +143,7 @@ void Space<Scalar, Layout>::buildCollisionGraph() {
 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::resolveCollisions() {
-  contact_.solve(bodies_, this->config_, previous_dt_, profiler_);
+  contact_.solve(bodies_, this->config_, contact_dt_, profiler_);
 }
 
 template <Real Scalar, class Layout>
@@ -216,7 +169,8 @@ void Space<Scalar, Layout>::updateAdaptiveTimeStep() {
     dt_ = orbits_.nextStep(bodies_, c);
     return;
   }
-  const StepLimits<Scalar> limits{c.timeStepFactor, c.minTimeStep, c.timeStep};
+  const StepLimits<Scalar> limits{c.timeStepFactor, c.minTimeStep, c.timeStep,
+                                  Scalar(static_cast<double>(mostContactSteps(c.contactSubsteps)))};
   Scalar wanted = limits.largest;
   const bool pulls = !(getG() == Scalar(0)) && n() > 1;
   // Something at rest outside, or a force whose law is not known, counts by the motion of single bodies.

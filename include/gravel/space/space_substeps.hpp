@@ -1,0 +1,144 @@
+#pragma once
+
+/// \file
+/// Members of `Space` that make the parts of a step: forces once a step, contacts in each part.
+///
+/// In a step of length h in n parts the acceleration a_0 of the step before is held, and every part of length
+/// h/n is a whole step of its own under it: kick, contacts, impacts, drift, search, kick, contacts. Forces
+/// are evaluated once, at the places of the end, and the last kick makes up for the held ones:
+///   x_1 = x_0 + v_0 h + a_0 h^2/2,   v_1 = v_0 + a_0 h + (a_1 - a_0) h/2
+/// Without contacts that is velocity Verlet itself, for any n: of order 2, symplectic, reversible. What rests
+/// carries its weight in every part, so that nothing falls between two evaluations nor is thrown up by a kick
+/// of the whole step's gravity, as it would be if forces came as impulses at the ends alone (r-RESPA:
+/// Tuckerman, Berne & Martyna 1992, J. Chem. Phys. 97, 1990); without contacts both are the same map. A blow
+/// meets a_0, off by h da/dt, as in a step of one part: order 2. In a shear-periodic domain the drift is no
+/// straight line: there a held force and one that kicks at the ends differ by O(h^3) a step, so that with
+/// n > 1 order 2 is kept, but reversible the map is only up to that.
+
+#include <gravel/dynamics/epicycle.hpp>
+#include <gravel/space/space.hpp>
+
+namespace gravel {
+
+/// Most parts of a step that are chosen by motion.
+inline constexpr std::size_t mostChosenSubsteps = 32;
+
+/// The most contact steps in a step, for a setting of which 0 leaves the choice.
+constexpr std::size_t mostContactSteps(std::size_t asked) { return asked == 0 ? mostChosenSubsteps : asked; }
+
+/// Between the first kick and the drift: the contacts that the last part left, and the impacts on the way.
+template <Real Scalar, class Layout>
+struct Space<Scalar, Layout>::Departure {
+  Space* space;
+  Scalar start;  ///< [s] since the start of the step
+  Scalar h;
+  explicit operator bool() const { return true; }
+  void operator()(const Scalar& kick) const {
+    if (!space->contacts().empty()) {
+      space->resolveCollisions();
+      space->contact_.endFirstHalf(space->force_, space->bodies_, kick);
+    }
+    const HillFrame<Scalar> frame(space->contact_.domain);
+    if (frame.turns() || traitsOf(space->config_.integrator).forceEvaluations == 1) {  // one drift
+      space->contact_.strike(space->bodies_, space->config_, frame, Scalar(space->time_ + start), h,
+                             space->profiler_);
+    }
+  }
+};
+
+/// Into how many parts a step of length h is divided. Where motion chooses: no two bodies that touch move
+/// past each other by more than a quarter of the smaller radius in a part.
+template <Real Scalar, class Layout>
+std::size_t Space<Scalar, Layout>::chooseParts(const Scalar& h) const {
+  using std::sqrt;
+  if (this->config_.contactSubsteps != 0) {
+    return this->config_.contactSubsteps;
+  }
+  Scalar rate_sq(0);
+  for (const Contact<Scalar>& c : contacts()) {
+    const bool boundary = c.second == staticPartner;
+    Vector v = -Vector(bodies_.velocities()[c.first]) + c.drift;
+    Scalar r = bodies_.radii()[c.first];
+    if (!boundary) {
+      v += Vector(bodies_.velocities()[c.second]);
+      const Scalar r2 = bodies_.radii()[c.second];
+      r = r2 > Scalar(0) && (r2 < r || !(r > Scalar(0))) ? r2 : r;
+    }
+    rate_sq = std::max<Scalar>(rate_sq, v.squaredNorm() / (r * r));
+  }
+  const Scalar wanted = Scalar(4) * h * sqrt(rate_sq);
+  std::size_t parts = 1;
+  while (parts < mostChosenSubsteps && Scalar(static_cast<double>(parts)) < wanted) {
+    ++parts;
+  }
+  return parts;
+}
+
+/// One part of a step of length h.
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size_t parts) {
+  const bool last = part + 1 == parts;
+  const auto share = [&](std::size_t k) {
+    return k == 0 ? Scalar(0)
+                  : Scalar(h * (Scalar(static_cast<double>(k)) / Scalar(static_cast<double>(parts))));
+  };
+  const Scalar start = share(part);
+  const Scalar end = last ? h : share(part + 1);
+  contact_dt_ = parts == 1 ? h : Scalar(h / Scalar(static_cast<double>(parts)));
+  const Scalar late = Scalar(h - contact_dt_) / Scalar(2);  // [s] for which the last kick makes up
+  const HillFrame<Scalar> frame(contact_.domain);
+  // Without mutual gravity runs are not long orbits, and nothing is carried; nor along an epicycle.
+  const bool carry = this->config_.compensatedSummation && !(getG() == Scalar(0)) && !frame.turns() &&
+                     Compensation<Scalar>::carries;
+  Compensation<Scalar>* const lost = carry ? &lost_ : nullptr;
+  const bool torques = force_.hasTorques();
+  const auto kick = [&](const Scalar& time) {
+    detail::kickAndDrift(bodies_, time, Scalar(0), torques, lost);
+  };
+  const auto forces = [&](const Scalar& passed) {
+    if (!last) {
+      return;  // held
+    }
+    if (parts > 1) {
+      kick(Scalar(-late));  // back to the velocity of the step's middle, as one part has it here
+    }
+    force_.evaluate(bodies_, getG(), this->config_.softening, contact_.domain,
+                    Scalar(time_ + (start + passed)), profiler_);
+    if (parts > 1) {
+      kick(late);
+    }
+  };
+  const Departure departure{this, start, contact_dt_};
+  const auto arrival = [&] {
+    contact_.boundaries.advance(contact_dt_);
+    left_.work -= contact_.wrap(bodies_, Scalar(time_ + end));
+    contact_.detect(bodies_, this->config_, Scalar(time_ + end), contact_dt_, true, profiler_);
+    contact_.separate(bodies_, this->config_, Scalar(time_ + end), profiler_);
+  };
+  {
+    const Profiler::Scope scope(profiler_, Phase::Integration);
+    if (orbits_.moves(this->config_.integrator)) {
+      orbits_.advance(this->config_, bodies_, h, force_, forces);
+    } else if (frame.turns()) {
+      integrateEpicycle(frame, bodies_, contact_dt_, torques, forces, arrival, departure);
+    } else {
+      integrate(this->config_.integrator, bodies_, contact_dt_, torques, forces, arrival, departure, lost);
+    }
+  }
+  rememberPlaces();
+  left_.correction += contact_.separationWork(force_, bodies_);
+  if (force_.hook && last) {
+    const Scalar power = force_.hookPower(bodies_);
+    left_.work -= (hookPower_ + power) * h / Scalar(2);
+  }
+  const std::vector<std::pair<BodyId, BodyId>> merges = decideCollisions(Scalar(time_ + end));
+  resolveCollisions();
+  contact_.endPart(start, last);
+  mergeCollided(merges, Scalar(time_ + end));
+  if (!last && !merges.empty()) {
+    force_.evaluate(bodies_, getG(), this->config_.softening, contact_.domain, Scalar(time_ + end),
+                    profiler_);
+  }
+}
+
+}  // namespace gravel
