@@ -4,7 +4,7 @@
 /// An octree over bodies for fast multipoles: cells around their centre of mass, children side by side, every
 /// cell's bodies side by side.
 
-#include <gravel/core/parallel.hpp>
+#include <gravel/core/parallel_sort.hpp>
 #include <gravel/core/types.hpp>
 #include <gravel/spatial/morton.hpp>
 
@@ -190,17 +190,29 @@ struct BodyTree {
 
   /// Keys of rows [first, last) in the cube around them, and the rows sorted by them. Returns the edge.
   S assignKeys(std::uint32_t first, std::uint32_t last) {
-    S low[3], high[3];
+    S low[3];
     const std::vector<S>* columns[3] = {&x, &y, &z};
     S edge(0);
     for (int axis = 0; axis < 3; ++axis) {
       const std::vector<S>& column = *columns[axis];
-      low[axis] = high[axis] = column[first];
-      for (std::uint32_t i = first; i < last; ++i) {
-        low[axis] = column[i] < low[axis] ? column[i] : low[axis];
-        high[axis] = high[axis] < column[i] ? column[i] : high[axis];
+      const Chunks chunks(last - first, 16384);
+      std::vector<std::array<S, 2>> ends(chunks.count());
+      parallelForTasks(chunks.count(), [&](std::size_t c) {
+        S least = column[first + chunks.begin(c)];
+        S most = least;
+        for (std::size_t i = first + chunks.begin(c); i < first + chunks.end(c); ++i) {
+          least = column[i] < least ? column[i] : least;
+          most = most < column[i] ? column[i] : most;
+        }
+        ends[c] = {least, most};
+      });
+      low[axis] = ends[0][0];
+      S high = ends[0][1];
+      for (const std::array<S, 2>& part : ends) {
+        low[axis] = part[0] < low[axis] ? part[0] : low[axis];
+        high = high < part[1] ? part[1] : high;
       }
-      edge = std::max(edge, S(high[axis] - low[axis]));
+      edge = std::max(edge, S(high - low[axis]));
     }
     parallelFor(last - first, 8192, [&](std::size_t k) {
       const std::size_t i = first + k;
@@ -208,8 +220,9 @@ struct BodyTree {
                             mortonCell(z[i], low[2], edge)),
                   static_cast<std::uint32_t>(i)};
     });
-    std::sort(keys_.begin() + first, keys_.begin() + last,
-              [](const Key& a, const Key& b) { return a.key < b.key || (a.key == b.key && a.row < b.row); });
+    parallelSort(keys_, first, last, keyScratch_, [](const Key& a, const Key& b) {
+      return a.key < b.key || (a.key == b.key && a.row < b.row);
+    });
     for (std::vector<S>* column : {&x, &y, &z, &m}) {
       permute(*column, scratch_, first, last);
     }
@@ -220,10 +233,9 @@ struct BodyTree {
   template <class T>
   void permute(std::vector<T>& column, std::vector<T>& scratch, std::uint32_t first, std::uint32_t last) {
     scratch.resize(size());
-    for (std::uint32_t i = first; i < last; ++i) {
-      scratch[i] = column[keys_[i].row];
-    }
-    std::copy(scratch.begin() + first, scratch.begin() + last, column.begin() + first);
+    parallelFor(last - first, 16384,
+                [&](std::size_t k) { scratch[first + k] = column[keys_[first + k].row]; });
+    parallelFor(last - first, 16384, [&](std::size_t k) { column[first + k] = scratch[first + k]; });
   }
 
   static constexpr int bits = 21;
@@ -272,7 +284,7 @@ struct BodyTree {
   std::vector<std::uint32_t> before_;  ///< empty where all rows have mass
   std::array<std::vector<S>, 4> packed_;
   std::vector<std::uint32_t> sinksBefore_;  ///< empty where all are wanted
-  std::vector<Key> keys_;
+  std::vector<Key> keys_, keyScratch_;
   std::vector<Frame> frames_;  ///< of each cell
   std::vector<S> edges_;
   S smallest_ = S(0);

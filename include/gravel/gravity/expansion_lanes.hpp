@@ -54,16 +54,18 @@ struct FarBatch<double> {
   static void store(double* p, const V& v) { std::copy_n(reinterpret_cast<const double*>(&v), width, p); }
 };
 
+/// Up to these orders; at bodies lower, where it is a smaller share of the work beside the time to compile.
 inline constexpr int unrolledOrder = 10;
+inline constexpr int unrolledOrderAtBodies = 6;
 
-/// The terms that a result of order N of a harmonic contraction of order P has: each moment but the dipoles,
-/// and the derivative that belongs to it, counted from that of the first moment. They are the same for every
-/// result of a row (N, C).
-template <int P, int N, int C>
+/// The terms that a result of order N of a harmonic contraction of order P has: each moment, with or without
+/// the dipoles, and the derivative that belongs to it, counted from that of the first moment. They are the
+/// same for every result of a row (N, C).
+template <int P, int N, int C, bool Dipole>
 struct RowTerms {
   using M = HarmonicTerms::Moments;
   using D = HarmonicTerms::Derivatives;
-  static constexpr int count = M::size(P - N) - (P > N ? 3 : 0);
+  static constexpr int count = M::size(P - N) - (P > N && !Dipole ? 3 : 0);
 
   std::array<short, count> moment{};
   std::array<short, count> derivative{};
@@ -71,7 +73,7 @@ struct RowTerms {
   constexpr RowTerms() {
     std::size_t term = 0;
     for (int k = 0; k <= P - N; ++k) {
-      for (int c = 0; k != 1 && c <= M::lastZ(k); ++c) {
+      for (int c = 0; (Dipole || k != 1) && c <= M::lastZ(k); ++c) {
         for (int b = 0; b <= k - c; ++b, ++term) {
           moment[term] = static_cast<short>(M::row(k, c) + b);
           derivative[term] = static_cast<short>(D::row(N + k, C + c) + b);
@@ -91,7 +93,7 @@ struct UnrolledExpansion {
   /// locals += what moments (without dipoles) make of derivatives, from the order `first` (0 or 1) on.
   static void contract(int first, const V* moments, const V* derivatives, V* locals) {
     if (first == 0) {
-      contractTo<0, 0, 0>(moments, derivatives, locals);
+      contractTo<false, 0, 0, 0>(moments, derivatives, locals);
     }
     contractAll(moments, derivatives, locals, std::make_index_sequence<P>());
   }
@@ -102,37 +104,52 @@ struct UnrolledExpansion {
     derivativesAll({q * x, q * y, q * z, q}, d, std::make_index_sequence<P>());
   }
 
+  /// q[k] = Q_k(x, y, z).
+  static void regular(const V& x, const V& y, const V& z, V* q) {
+    q[0] = x - x + 1.0;
+    regularAll(x, y, z, q, std::make_index_sequence<P>());
+  }
+
+  /// field += a local expansion and its first derivatives, or, with `first` 1, these alone.
+  static void evaluate(int first, const V* regular, const double* local, V* field) {
+    if (first == 0) {
+      contractTo<true, 0, 0, 0>(regular, local, field);
+    }
+    contractTo<true, 1, 0, 0>(regular, local, field);
+    contractTo<true, 1, 1, 0>(regular, local, field);
+  }
+
  private:
   template <std::size_t... N>
   static void contractAll(const V* m, const V* d, V* out, std::index_sequence<N...>) {
-    ((contractTo<N + 1, 0, 0>(m, d, out), contractTo<N + 1, 1, 0>(m, d, out)), ...);
+    ((contractTo<false, N + 1, 0, 0>(m, d, out), contractTo<false, N + 1, 1, 0>(m, d, out)), ...);
   }
 
   /// The results from (N, C, B) to the end of the row, four at a time: each moment is loaded once for them,
   /// and their sums do not wait for each other.
-  template <int N, int C, int B>
-  static void contractTo(const V* m, const V* d, V* out) {
+  template <bool Dipole, int N, int C, int B, class TD>
+  static void contractTo(const V* m, const TD* d, V* out) {
     constexpr int results = std::min(4, N - C - B + 1);
     if constexpr (results > 0) {
-      static constexpr RowTerms<P, N, C> terms{};
+      static constexpr RowTerms<P, N, C, Dipole> terms{};
       V sums[results];
       V* to = out + M::row(N, C) + B;
       std::copy_n(to, results, sums);
       addTerms(sums, terms, m, d + B, std::make_index_sequence<results>(),
                std::make_index_sequence<terms.count>());
       std::copy_n(sums, results, to);
-      contractTo<N, C, B + results>(m, d, out);
+      contractTo<Dipole, N, C, B + results>(m, d, out);
     }
   }
 
-  template <class Sums, class Terms, class Results, std::size_t... I>
-  [[gnu::always_inline]] static void addTerms(Sums& sums, const Terms& terms, const V* m, const V* d,
+  template <class Sums, class Terms, class TD, class Results, std::size_t... I>
+  [[gnu::always_inline]] static void addTerms(Sums& sums, const Terms& terms, const V* m, const TD* d,
                                               Results results, std::index_sequence<I...>) {
     (addTerm(sums, m[terms.moment[I]], d + terms.derivative[I], results), ...);
   }
 
-  template <class Sums, std::size_t... R>
-  [[gnu::always_inline]] static void addTerm(Sums& sums, const V& moment, const V* d,
+  template <class Sums, class TD, std::size_t... R>
+  [[gnu::always_inline]] static void addTerm(Sums& sums, const V& moment, const TD* d,
                                              std::index_sequence<R...>) {
     ((sums[R] += moment * d[R]), ...);
   }
@@ -184,35 +201,93 @@ struct UnrolledExpansion {
     }
     d[D::row(N, C) + B] = sum;
   }
+
+  template <std::size_t... N>
+  static void regularAll(const V& x, const V& y, const V& z, V* q, std::index_sequence<N...>) {
+    ((regularRow<N + 1, 0>(x, y, z, q, std::make_index_sequence<N + 2>()),
+      regularRow<N + 1, 1>(x, y, z, q, std::make_index_sequence<N + 1>())),
+     ...);
+  }
+
+  template <int N, int C, std::size_t... B>
+  static void regularRow(const V& x, const V& y, const V& z, V* q, std::index_sequence<B...>) {
+    (regularTerm<N, C, static_cast<int>(B)>(x, y, z, q), ...);
+  }
+
+  /// See Expansion::regular.
+  template <int N, int C, int B>
+  static void regularTerm(const V& x, const V& y, const V& z, V* q) {
+    constexpr int a = N - C - B;
+    V sum = x - x;
+    if constexpr (a > 0) {
+      sum += x * q[M::row(N - 1, C) + B];
+    }
+    if constexpr (B > 0) {
+      sum += y * q[M::row(N - 1, C) + B - 1];
+    }
+    if constexpr (C > 0) {
+      sum += z * q[M::row(N - 1, 0) + B];
+    } else {
+      if constexpr (a > 1) {
+        sum -= z * q[M::row(N - 1, 1) + B];
+      }
+      if constexpr (B > 1) {
+        sum -= z * q[M::row(N - 1, 1) + B - 2];
+      }
+    }
+    q[M::row(N, C) + B] = (1.0 / N) * sum;
+  }
 };
 
-/// A batch's locals += the effect of its moments at the distances x, y, z; f = 0 switches a lane off.
+/// The costly operators, unrolled where they can be.
 template <class Terms, class V>
 struct FarOperators {
   using X = Expansion<Terms>;
+  using F = ScalarOf<V>;
 
+  /// A batch's locals += the effect of its moments at the distances x, y, z; f = 0 switches a lane off.
   /// \param f 1/r  \param q -1/(r^2 + eps^2)
   static void interact(int order, int first, const V& x, const V& y, const V& z, const V& q, const V& f,
                        const V* moments, V* derivatives, V* locals) {
-    if constexpr (Terms::harmonic && std::is_same_v<V, NativeDoubles>) {
-      if (order <= unrolledOrder) {
-        unrolled(order, first, x, y, z, q, f, moments, derivatives, locals,
-                 std::make_index_sequence<unrolledOrder>());
-        return;
-      }
+    const bool done = unrolled<unrolledOrder>(order, [&](auto expansion) {
+      expansion.derivatives(x, y, z, q, f, derivatives);
+      expansion.contract(first, moments, derivatives, locals);
+    });
+    if (!done) {
+      X::derivatives(order, x, y, z, q, f, derivatives);
+      X::template contract<false>(order, first, order, moments, derivatives, locals);
     }
-    X::derivatives(order, x, y, z, q, f, derivatives);
-    X::template contract<false>(order, first, order, moments, derivatives, locals);
+  }
+
+  static void regular(int order, const V& x, const V& y, const V& z, V* q) {
+    if (!unrolled<unrolledOrderAtBodies>(order, [&](auto expansion) { expansion.regular(x, y, z, q); })) {
+      X::regular(order, x, y, z, q);
+    }
+  }
+
+  /// field += a local expansion and its first derivatives at the places of Q = regular; without the expansion
+  /// itself if `first` is 1. \param local in the rows of derivatives
+  static void evaluate(int order, int first, const V* regular, const F* local, V* field) {
+    if (!unrolled<unrolledOrderAtBodies>(
+            order, [&](auto expansion) { expansion.evaluate(first, regular, local, field); })) {
+      X::contract(order, first, 1, regular, local, field);
+    }
   }
 
  private:
-  template <std::size_t... I>
-  static void unrolled(int order, int first, const V& x, const V& y, const V& z, const V& q, const V& f,
-                       const V* moments, V* derivatives, V* locals, std::index_sequence<I...>) {
-    ((order == I + 1 ? (UnrolledExpansion<I + 1>::derivatives(x, y, z, q, f, derivatives),
-                        UnrolledExpansion<I + 1>::contract(first, moments, derivatives, locals))
-                     : void()),
-     ...);
+  /// Calls f with the unrolled operators of an order if there are any.
+  template <int Last, class Call>
+  static bool unrolled(int order, Call&& call) {
+    if constexpr (Terms::harmonic && std::is_same_v<V, NativeDoubles>) {
+      return choose(order, call, std::make_index_sequence<Last>());
+    } else {
+      return false;
+    }
+  }
+
+  template <class Call, std::size_t... I>
+  static bool choose(int order, Call& call, std::index_sequence<I...>) {
+    return ((order == I + 1 && (call(UnrolledExpansion<I + 1>()), true)) || ...);
   }
 };
 

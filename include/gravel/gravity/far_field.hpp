@@ -48,7 +48,8 @@ class FarField {
           r[axis][w] = part.centre[axis] - cell.centre[axis];
         }
       }
-      X::regular(order_, Batch::load(r[0]), Batch::load(r[1]), Batch::load(r[2]), laneRegular_.data());
+      Operators::regular(order_, Batch::load(r[0]), Batch::load(r[1]), Batch::load(r[2]),
+                         laneRegular_.data());
       std::fill(laneMoved_.begin(), laneMoved_.end(), Batch::zero());
       X::contract(order_, first_, order_, laneRegular_.data(), spread_.data(), laneMoved_.data());
       const auto* lanes = reinterpret_cast<const F*>(laneMoved_.data());
@@ -106,10 +107,11 @@ class FarField {
         r[1][w] = F(tree_.y[i + w]) - cell.centre[1];
         r[2][w] = F(tree_.z[i + w]) - cell.centre[2];
       }
-      X::regular(order_, Batch::load(r[0]), Batch::load(r[1]), Batch::load(r[2]), laneRegular_.data());
+      Operators::regular(order_, Batch::load(r[0]), Batch::load(r[1]), Batch::load(r[2]),
+                         laneRegular_.data());
       V field[4] = {Batch::zero(), Batch::zero(), Batch::zero(),
                     Batch::zero()};  // the potential and its derivatives by x, y, z
-      X::contract(order_, first_, 1, laneRegular_.data(), spread_.data(), field);
+      Operators::evaluate(order_, first_, laneRegular_.data(), spread_.data(), field);
       alignas(64) F values[4][Batch::width];
       for (int k = 0; k < 4; ++k) {
         Batch::store(values[k], field[k]);
@@ -131,7 +133,9 @@ class FarField {
   using D = typename X::D;
   using Batch = FarBatch<F>;
   using V = typename Batch::V;
+  using Operators = FarOperators<Terms, V>;
   static constexpr std::size_t parts = Batch::size / Batch::width;
+  static constexpr std::size_t dipolesEnd = 4;  ///< about a centre of mass they vanish, and are not read
 
   void flush(const Cell& sink) {
     if (batches_++ == 0) {
@@ -151,22 +155,26 @@ class FarField {
       r[3][w] = r_sq;
       const F* m = moments_.of(s.cell);
       F* to = lanes + w / Batch::width * terms_ * Batch::width + w % Batch::width;
-      for (std::size_t k = 0; k < terms_; ++k) {
+      to[0] = m[0];
+      for (std::size_t k = dipolesEnd; k < terms_; ++k) {
         to[k * Batch::width] = m[k];
       }
     }
-    using std::sqrt;
-    for (std::size_t w = 0; w < Batch::size; ++w) {
-      r[4][w] = w < batched_ ? F(F(1) / sqrt(r[3][w])) : F(0);
-      r[3][w] = F(-1) / r[3][w];
+    // Each scalar has vectors of Eigen's with a packed square root; the lanes of a batch are others.
+    using Row = Eigen::Array<F, static_cast<int>(Batch::size), 1>;
+    Eigen::Map<Row> inverse(r[4]);
+    Eigen::Map<Row> squares(r[3]);
+    inverse = squares.sqrt().inverse();
+    squares = -squares.inverse();
+    for (std::size_t w = batched_; w < Batch::size; ++w) {
+      r[4][w] = F(0);
     }
     batched_ = 0;
     for (std::size_t part = 0; part < parts; ++part) {
       const std::size_t w = part * Batch::width;
-      FarOperators<Terms, V>::interact(order_, first_, Batch::load(r[0] + w), Batch::load(r[1] + w),
-                                       Batch::load(r[2] + w), Batch::load(r[3] + w), Batch::load(r[4] + w),
-                                       &laneMoments_[part * terms_], laneDerivatives_.data(),
-                                       &laneLocals_[part * terms_]);
+      Operators::interact(order_, first_, Batch::load(r[0] + w), Batch::load(r[1] + w), Batch::load(r[2] + w),
+                          Batch::load(r[3] + w), Batch::load(r[4] + w), &laneMoments_[part * terms_],
+                          laneDerivatives_.data(), &laneLocals_[part * terms_]);
     }
   }
 

@@ -9,9 +9,9 @@
 namespace gravel::detail {
 
 /// Sets each cell's weight to share / sqrt(mean of 1/a^2) over its bodies, a the acceleration (G = 1) that
-/// groups of at most `groupSize` bodies feel at their centre from other cells, and images of cells, as
-/// points. An error of that size at all of them has a relative rms of `share`. Accelerations below a
-/// thousandth of the mean count as that much; in a periodic system, where they may cancel everywhere, the
+/// groups of at most 64 bodies, of large systems 256, feel at their centre from other cells, and images of
+/// cells, as points. An error of that size at all of them has a relative rms of `share`. Accelerations below
+/// a thousandth of the mean count as that much; in a periodic system, where they may cancel everywhere, the
 /// mean counts as at least a tenth of the pull of one body at the mean distance. Needs the geometry of
 /// TreeMoments. About 100 pairs of cells a group.
 template <Real S, Real F>
@@ -21,11 +21,12 @@ class FieldStrength {
   void compute(BodyTree<S, F>& tree, const F& share, const PeriodicImages<S, F>& images,
                const ImageField<S, F>& field) {
     const std::size_t n = tree.cells.size();
+    groupSize_ = static_cast<std::uint32_t>(std::clamp<std::size_t>(tree.size() / 256, 64, 256));
     groups_.clear();
     isBelow_.assign(n, 0);
     for (std::uint32_t c = 0; c < n; ++c) {
       const TreeCell<F>& cell = tree.cells[c];
-      const bool isGroup = isBelow_[c] == 0 && (cell.isLeaf() || cell.count() <= groupSize);
+      const bool isGroup = isBelow_[c] == 0 && (cell.isLeaf() || cell.count() <= groupSize_);
       if (isGroup) {
         groups_.push_back(c);
       }
@@ -60,8 +61,6 @@ class FieldStrength {
   }
 
  private:
-  static constexpr std::uint32_t groupSize = 64;
-
   /// Of a body of mean mass, bodies taken to fill the sphere around the root.
   static F pullAtMeanDistance(const BodyTree<S, F>& tree) {
     const TreeCell<F>& root = tree.cells[0];
@@ -71,8 +70,8 @@ class FieldStrength {
   }
 
   /// Adds to `sum` what an image of all cells does to a group.
-  static void addField(const BodyTree<S, F>& tree, const TreeCell<F>& group, const Vector3<F>& shift,
-                       std::vector<std::uint32_t>& todo, Vector3<F>& sum) {
+  void addField(const BodyTree<S, F>& tree, const TreeCell<F>& group, const Vector3<F>& shift,
+                std::vector<std::uint32_t>& todo, Vector3<F>& sum) const {
     using std::sqrt;
     todo.assign(1, 0);
     while (!todo.empty()) {
@@ -82,7 +81,7 @@ class FieldStrength {
       const F r_sq = d.squaredNorm();
       const F own = F(source.radius) * F(source.radius);
       const bool isFar = r_sq > F(1.5) * own;
-      if (isFar || source.isLeaf() || source.count() <= groupSize) {
+      if (isFar || source.isLeaf() || source.count() <= groupSize_) {
         const F near = F(group.radius) * F(group.radius);
         const F s = r_sq + (isFar && r_sq > near ? F(0) : F(own + near));
         if (s > F(0)) {
@@ -109,7 +108,7 @@ class FieldStrength {
     }
     for (std::size_t c = tree.cells.size(); c-- > 0;) {
       TreeCell<F>& cell = tree.cells[c];
-      if (isBelow_[c] == 0 && !(cell.isLeaf() || cell.count() <= groupSize)) {
+      if (isBelow_[c] == 0 && !(cell.isLeaf() || cell.count() <= groupSize_)) {
         for (std::uint32_t child = cell.child; child < cell.child + cell.children; ++child) {
           cell.weight += tree.cells[child].weight;
         }
@@ -130,6 +129,7 @@ class FieldStrength {
     }
   }
 
+  std::uint32_t groupSize_ = 64;
   std::vector<std::uint32_t> groups_;
   std::vector<std::uint8_t> isBelow_;
   std::vector<F> strength_;

@@ -4,6 +4,7 @@
 /// What every gravity sum does first: look at its input, and choose units in which nothing overflows.
 
 #include <gravel/core/check.hpp>
+#include <gravel/core/parallel.hpp>
 
 #include <algorithm>
 
@@ -38,20 +39,25 @@ class GravityUnits {
     if (masses.size() != n) {
       refuse("length of masses", std::to_string(masses.size()), "that of positions, " + std::to_string(n));
     }
-    Vector3<S> low = Vector3<S>::Zero();
-    Vector3<S> high = Vector3<S>::Zero();
-    S heaviest(0);
-    for (std::size_t i = 0; i < n; ++i) {
-      const Vector3<S> half = positions[i] / S(2);  // the extent of two huge numbers is in range
-      const S m = masses[i];
-      if (!isFinite(half) || !isFinite(m) || m < S(0)) {
-        refuseBody(i, positions[i], m);
+    constexpr std::size_t share = 16384;
+    Range all = lookAt(positions, masses, 0, std::min(n, share));
+    if (n > share) {
+      const Chunks chunks(n, share);
+      std::vector<Range> parts(chunks.count(), all);
+      parallelForTasks(chunks.count() - 1, [&](std::size_t c) {
+        parts[c + 1] = lookAt(positions, masses, chunks.begin(c + 1), chunks.end(c + 1));
+      });
+      for (std::size_t c = 1; c < parts.size(); ++c) {
+        all.add(parts[c]);
       }
-      low = i == 0 ? half : low.cwiseMin(half);
-      high = i == 0 ? half : high.cwiseMax(half);
-      heaviest = std::max(heaviest, m);
-      sources_ += m > S(0) ? 1U : 0U;
     }
+    if (all.refused < n) {
+      refuseBody(all.refused, positions[all.refused], masses[all.refused]);
+    }
+    const Vector3<S>& low = all.low;
+    const Vector3<S>& high = all.high;
+    const S& heaviest = all.heaviest;
+    sources_ = all.sources;
     low_ = low[2] * S(2);
     high_ = high[2] * S(2);
     S extent = softening;
@@ -95,6 +101,42 @@ class GravityUnits {
   Factor energy(const S& G) const { return Factor(G, 2 * massExponent_ - lengthExponent_); }
 
  private:
+  /// What was found of some bodies.
+  struct Range {
+    Vector3<S> low =
+        Vector3<S>::Zero();  ///< of half the positions: the extent of two huge numbers is in range
+    Vector3<S> high = Vector3<S>::Zero();
+    S heaviest = S(0);
+    std::size_t sources = 0;
+    std::size_t refused = std::numeric_limits<std::size_t>::max();  ///< first that makes no force
+
+    void add(const Range& other) {
+      low = low.cwiseMin(other.low);
+      high = high.cwiseMax(other.high);
+      heaviest = std::max(heaviest, other.heaviest);
+      sources += other.sources;
+      refused = std::min(refused, other.refused);
+    }
+  };
+
+  template <class Positions, class Masses>
+  static Range lookAt(const Positions& positions, const Masses& masses, std::size_t begin, std::size_t end) {
+    Range range;
+    for (std::size_t i = begin; i < end; ++i) {
+      const Vector3<S> half = positions[i] / S(2);
+      const S m = masses[i];
+      if (!isFinite(half) || !isFinite(m) || m < S(0)) {
+        range.refused = i;
+        break;
+      }
+      range.low = i == begin ? half : range.low.cwiseMin(half);
+      range.high = i == begin ? half : range.high.cwiseMax(half);
+      range.heaviest = std::max(range.heaviest, m);
+      range.sources += m > S(0) ? 1U : 0U;
+    }
+    return range;
+  }
+
   /// The power of two that brings x near 1; 0 for a scalar whose exponent cannot be had.
   static int exponentOf(const S& x) {
     if constexpr (std::is_floating_point_v<S>) {

@@ -16,10 +16,12 @@ struct MultipolePlan {
   std::size_t crossover;      ///< bodies from which on it is faster than the direct sum
 };
 
-inline constexpr std::array<MultipolePlan, 8> multipolePlans{{
-    {3e-3, 4, 0.65, 64, 3000},
-    {1e-3, 5, 0.65, 128, 3700},
-    {1e-4, 6, 0.6, 128, 5000},
+inline constexpr std::array<MultipolePlan, 10> multipolePlans{{
+    {6e-3, 4, 0.27, 64, 3000},
+    {2.5e-3, 5, 0.35, 64, 3200},
+    {1e-3, 6, 0.3, 64, 3700},
+    {3e-4, 6, 0.5, 64, 4300},
+    {1e-4, 6, 0.72, 128, 5000},
     {1e-5, 8, 0.6, 256, 8000},
     {1e-6, 9, 0.5, 256, 12500},
     {3e-8, 10, 0.45, 384, 23000},

@@ -190,15 +190,20 @@ class MultipoleWalk {
     const F r_sq = r.squaredNorm();
     const F both = F(a.radius) + F(b.radius);
     const F gap = r_sq - both * both;
-    return gap > F(0) && isAccurate(a, b, r_sq, gap) && isAccurate(b, a, r_sq, gap);
+    if (!(gap > F(0))) {
+      return false;
+    }
+    const F inverse_sq = F(1) / r_sq;
+    const F pull = r_sq / (gap * gap);
+    return isAccurate(a, b, inverse_sq, pull) && isAccurate(b, a, inverse_sq, pull);
   }
 
   /// (M / r^2) ((s + R) / r)^p / (1 - theta^2)^2 within the sink's allowance: s the radius of the source's
-  /// mass, R that of the sink.
-  bool isAccurate(const Cell& source, const Cell& sink, const F& r_sq, const F& gap) const {
+  /// mass, R that of the sink. \param pull 1 / (r^2 (1 - theta^2)^2)
+  bool isAccurate(const Cell& source, const Cell& sink, const F& inverse_sq, const F& pull) const {
     const F reach = F(source.spread) + F(sink.radius);
-    const F ratio_sq = reach * reach / r_sq;
-    F error = source.mass * r_sq / (gap * gap);
+    const F ratio_sq = reach * reach * inverse_sq;
+    F error = source.mass * pull;
     error *= error;
     for (int k = 0; k < limits_.order; ++k) {
       error *= ratio_sq;

@@ -155,7 +155,8 @@ class TreeMoments {
         r[2][w] = cell.centre[2] - F(tree.z[i + w]);
         r[3][w] = F(tree.m[i + w]);
       }
-      X::regular(order_, Batch::load(r[0]), Batch::load(r[1]), Batch::load(r[2]), scratch.regular.data());
+      FarOperators<Terms, V>::regular(order_, Batch::load(r[0]), Batch::load(r[1]), Batch::load(r[2]),
+                                      scratch.regular.data());
       const V m = Batch::load(r[3]);
       for (std::size_t k = 0; k < terms_; ++k) {
         scratch.sums[k] += m * scratch.regular[k];
@@ -182,7 +183,8 @@ class TreeMoments {
           lanes[k * Batch::width + w] = w < count ? of(cell.child + child + w)[k] : F(0);
         }
       }
-      X::regular(order_, Batch::load(r[0]), Batch::load(r[1]), Batch::load(r[2]), scratch.regular.data());
+      FarOperators<Terms, V>::regular(order_, Batch::load(r[0]), Batch::load(r[1]), Batch::load(r[2]),
+                                      scratch.regular.data());
       X::shiftMoments(order_, scratch.regular.data(), scratch.moments.data(), scratch.sums.data());
     }
     reduce(c, scratch);
