@@ -4,9 +4,8 @@
 ///
 ///   bench_beside_bullet [bodies] [steps to settle] [rounds] [steps a round]
 
-#include "scenes/scenes.hpp"
+#include "boxes.hpp"
 #include "stopwatch.hpp"
-#include <gravel/gravel.hpp>
 
 #include <btBulletDynamicsCommon.h>
 #include <omp.h>
@@ -21,104 +20,19 @@
 namespace {
 
 using namespace gravel;
-using Vec = Vector3<double>;
-
-constexpr double radius = 0.5;
-constexpr double g = 9.81;
-constexpr double friction = 0.5;
-
-struct Errors {
-  double meanOverlap = 0;  ///< over the radius
-  double largestOverlap = 0;
-  double kinetic = 0;  ///< over N m g R
-};
-
-/// What both engines simulate.
-struct Scene {
-  std::vector<Body<double>> bodies;
-  double width = 0;    ///< of the box
-  double height = -1;  ///< of its lid; none if negative
-  double g = 0;
-  double e = 0;
-  double mu = 0;
-  double h = 1.0 / 60;
-};
-
-Scene pile(std::size_t n, double e) {
-  Scene scene;
-  const auto side = static_cast<std::size_t>(std::cbrt(static_cast<double>(n)) + 0.5);
-  scene.width = 1.1 * static_cast<double>(side) * 2 * radius;
-  scene.g = g;
-  scene.e = e;
-  scene.mu = friction;
-  const double spacing = scene.width / static_cast<double>(side);
-  const CounterRandom random(1);
-  for (std::size_t i = 0; i < n; ++i) {
-    const auto at = [&](std::size_t k, std::uint64_t axis) {
-      return (static_cast<double>(k) + 0.5) * spacing - scene.width / 2 +
-             random.uniform(3 * i + axis, -0.04, 0.04);
-    };
-    Body<double> grain;
-    grain.radius = radius;
-    grain.mass = 1;
-    grain.position = {at(i % side, 0), at(i / side % side, 1),
-                      radius + 0.04 + static_cast<double>(i / (side * side)) * 2.2 * radius};
-    scene.bodies.push_back(grain);
-  }
-  return scene;
-}
-
-/// Elastic and frictionless at volume fraction 0.2 in a box; a sphere moves 0.01 of its diameter a step.
-Scene gas(std::size_t n) {
-  Scene scene;
-  scene.e = 1;
-  scene.width = gravel::scenes::gasBoxLength(n, 0.2) + 2 * radius;
-  scene.height = scene.width;
-  for (Body<double> body :
-       gravel::scenes::randomGas<double>(n, 0.2)) {  // apart in a periodic box: all the more in this one
-    body.position[2] += scene.width / 2;
-    scene.bodies.push_back(body);
-  }
-  double speed_sq = 0;
-  for (const Body<double>& body : scene.bodies) {
-    speed_sq += body.velocity.squaredNorm() / static_cast<double>(n);
-  }
-  scene.h = 0.01 * 2 * radius / std::sqrt(speed_sq);
-  return scene;
-}
+using namespace boxes;
 
 class Gravel {
  public:
-  explicit Gravel(const Scene& scene) : scene_(scene), space_(configOf(scene)) {
-    space_.addPlane({0, 0, 1}, 0);
-    for (const double s : {-1.0, 1.0}) {
-      space_.addPlane({s, 0, 0}, -scene.width / 2);
-      space_.addPlane({0, s, 0}, -scene.width / 2);
-    }
-    if (scene.height > 0) {
-      space_.addPlane({0, 0, -1}, -scene.height);
-    }
-    space_.setUniformField({0, 0, -scene.g});
-    for (const Body<double>& body : scene.bodies) {
-      space_.addBody(body);
-    }
-  }
+  explicit Gravel(const Scene& scene) : scene_(scene), space_(spaceOf(scene, config())) {}
 
   void step() {
     space_.computeDynamics(steps_++);
     sweeps_ += space_.contactReport().iterations;
     impacts_ += space_.contactReport().impacts;
   }
-  double kinetic() const { return std::get<0>(space_.calculateSystemEnergy()); }
-  Errors errors() const {
-    Errors errors;
-    for (const Contact<double>& c : space_.contacts()) {
-      errors.meanOverlap += std::max(0.0, -c.gap) / radius / static_cast<double>(space_.contacts().size());
-      errors.largestOverlap = std::max(errors.largestOverlap, -c.gap / radius);
-    }
-    errors.kinetic = kinetic() / (static_cast<double>(space_.n()) * g * radius);
-    return errors;
-  }
+  double kinetic() const { return kineticEnergy(space_); }
+  Errors errors() const { return errorsOf(space_); }
   void report() const {
     std::printf("gravel: %zu contacts, %zu colours, %.1f sweeps and %.1f impacts a step, weight error %.1e\n",
                 space_.contacts().size(), space_.contactReport().colours,
@@ -129,13 +43,8 @@ class Gravel {
   }
 
  private:
-  static SimulationConfig<double> configOf(const Scene& scene) {
+  static SimulationConfig<double> config() {
     SimulationConfig<double> config;
-    config.G = 0;
-    config.timeStep = scene.h;
-    config.adaptiveTimeStep = false;
-    config.coeffRestitution = scene.e;
-    config.coeffFriction = config.coeffStaticFriction = scene.mu;
     config.contactTolerance = 1e-2;
     config.contactIterations = 4;
     return config;
@@ -155,17 +64,8 @@ class Bullet {
         dispatcher_(&configuration_),
         world_(&dispatcher_, &broadphase_, &solver_, &configuration_) {
     world_.setGravity(btVector3(0, 0, btScalar(-scene.g)));
-    const auto plane = [&](double x, double y, double z, double offset) {
-      add(scene, new btStaticPlaneShape(btVector3(btScalar(x), btScalar(y), btScalar(z)), btScalar(offset)),
-          nullptr);
-    };
-    plane(0, 0, 1, 0);
-    for (const double s : {-1.0, 1.0}) {
-      plane(s, 0, 0, -scene.width / 2);
-      plane(0, s, 0, -scene.width / 2);
-    }
-    if (scene.height > 0) {
-      plane(0, 0, -1, -scene.height);
+    for (const auto& [normal, offset] : scene.planes()) {
+      add(scene, new btStaticPlaneShape(vector(normal), btScalar(offset)), nullptr);
     }
     auto* const sphere = new btSphereShape(btScalar(radius));
     for (const Body<double>& body : scene.bodies) {
@@ -199,6 +99,8 @@ class Bullet {
   }
 
  private:
+  static btVector3 vector(const Vec& v) { return btVector3(btScalar(v[0]), btScalar(v[1]), btScalar(v[2])); }
+
   void add(const Scene& scene, btCollisionShape* shape, const Body<double>* body) {
     if (shapes_.empty() || shapes_.back().get() != shape) {
       shapes_.emplace_back(shape);
@@ -212,9 +114,6 @@ class Bullet {
     info.m_friction = btScalar(std::sqrt(scene.mu));  // Bullet multiplies those of the two
     info.m_restitution = btScalar(scene.e);
     info.m_startWorldTransform.setIdentity();
-    const auto vector = [](const Vec& v) {
-      return btVector3(btScalar(v[0]), btScalar(v[1]), btScalar(v[2]));
-    };
     if (body != nullptr) {
       info.m_startWorldTransform.setOrigin(vector(body->position));
     }
@@ -235,11 +134,6 @@ class Bullet {
   std::deque<std::unique_ptr<btRigidBody>> bodies_;
   btDiscreteDynamicsWorld world_;
 };
-
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
-}
 
 template <class Engine>
 double timed(Engine& engine, std::size_t steps) {
