@@ -53,6 +53,29 @@ struct Contact {
   }
 };
 
+/// What occurs among the contacts of a step.
+struct ContactKinds {
+  bool rub = false;     ///< friction
+  bool turn = false;    ///< resistance to rolling or spinning
+  bool spring = false;  ///< tangential restitution
+  bool drift = false;   ///< a second side that moves on by itself
+
+  template <Real S>
+  void include(const Contact<S>& c) {
+    rub = rub || c.material.staticFriction > S(0);
+    turn = turn || c.material.rollingFriction > S(0) || c.material.spinningFriction > S(0);
+    spring = spring || c.material.tangentialRestitution > S(0);
+    drift = drift || !(c.drift == Vector3<S>::Zero());
+  }
+  ContactKinds& operator+=(const ContactKinds& other) {
+    rub = rub || other.rub;
+    turn = turn || other.turn;
+    spring = spring || other.spring;
+    drift = drift || other.drift;
+    return *this;
+  }
+};
+
 /// A boundary: n.x >= offset is free.
 template <Real Scalar>
 struct HalfSpace {

@@ -94,6 +94,11 @@ class ContactEnergy {
           Sums sums = Sums::Zero();
           for (std::size_t k = begin; k < end; ++k) {
             const Row& row = problem.rows[k];
+            if (k + problem.lookAhead < problem.rows.size()) {
+              const Row& later = problem.rows[k + problem.lookAhead];
+              problem.fetch(later.slot1, later.slot2);
+              detail::prefetch(impulses[later.contact]);
+            }
             terms_[k] = S(0);
             if (!(row.jn > S(0))) {
               impulses[row.contact] = {};

@@ -13,22 +13,6 @@
 
 namespace gravel {
 
-/// What occurs among the contacts of a step.
-struct ContactKinds {
-  bool rub = false;     ///< friction
-  bool turn = false;    ///< resistance to rolling or spinning
-  bool spring = false;  ///< tangential restitution
-  bool drift = false;   ///< a second side that moves on by itself
-
-  template <Real S>
-  void include(const Contact<S>& c) {
-    rub = rub || c.material.staticFriction > S(0);
-    turn = turn || c.material.rollingFriction > S(0) || c.material.spinningFriction > S(0);
-    spring = spring || c.material.tangentialRestitution > S(0);
-    drift = drift || !(c.drift == Vector3<S>::Zero());
-  }
-};
-
 /// The problem of one step. Speeds and masses far from 1 are scaled by powers of two, which is exact, so that
 /// dust at 1e-310 m/s neither vanishes nor crawls through subnormal arithmetic.
 template <Real S>
@@ -36,6 +20,7 @@ class ContactProblem {
  public:
   using Body = detail::SolverBody<S>;
   using Row = detail::SolverRow<S>;
+  using Scales = detail::ProblemScales<S>;
 
   std::vector<Body> bodies;             ///< by slot; the last one is the boundary, at rest
   std::vector<Body> initial;            ///< the same before any impulse
@@ -67,6 +52,12 @@ class ContactProblem {
     const auto take = [&](std::size_t k) {
       const ContactColoring::Row& place = colouring.rows()[k];
       const Contact<S>& contact = contacts[place.contact];
+      if (k + lookAhead < contacts.size()) {
+        const ContactColoring::Row& later = colouring.rows()[k + lookAhead];
+        detail::prefetch(contacts[later.contact]);
+        detail::prefetch(last[later.contact]);
+        fetch(later.slot1, later.slot2);
+      }
       if (fresh) {
         fill(rows[k], contact, place, source);
         if (!turning.empty()) {
@@ -108,6 +99,15 @@ class ContactProblem {
     });
   }
 
+  /// Brings what a later row needs nearer: rows of a colour jump through bodies and contacts.
+  static constexpr std::size_t lookAhead = 8;
+  void fetch(std::uint32_t slot1, std::uint32_t slot2) const {
+    for (const std::uint32_t slot : {slot1, slot2}) {
+      detail::prefetch(bodies[slot]);
+      detail::prefetch(initial[slot]);
+    }
+  }
+
   /// Impulses and energies in SI units from those of the scaled problem, and back.
   S impulseOut(const S& j) const { return detail::scaled<S>(j, -speedExponent_ - massExponent_); }
   Vector3<S> impulseOut(const Vector3<S>& j) const {
@@ -140,36 +140,20 @@ class ContactProblem {
   void gatherBodies(const B& source, const ContactColoring& colouring) {
     const std::size_t n = colouring.bodies().size();
     bodies.resize(n + 1);
+    initial.resize(n + 1);
     falls_.resize(n + 1);
-    S fastest(0);
-    S lightest(0);
-    S heaviest(0);
-    for (std::size_t slot = 0; slot < n; ++slot) {
-      const std::uint32_t i = colouring.bodies()[slot];
-      Body& b = bodies[slot];
-      const bool movable = colouring.movable(static_cast<std::uint32_t>(slot));
-      const S r = source.radii()[i];
-      const S k = source.inertiaFactors()[i];
-      b.v = source.velocities()[i];
-      b.s = Vector3<S>::Zero();
-      if (friction) {
-        b.s = r * Vector3<S>(source.angularVelocities()[i]);
+    const Scales scales = orderedSum(n, chunk, Scales{}, [&](std::size_t begin, std::size_t end) {
+      Scales part;
+      for (std::size_t slot = begin; slot < end; ++slot) {
+        part += take(source, colouring, slot);
       }
-      const Vector3<S> a = movable ? Vector3<S>(source.accelerations()[i]) : Vector3<S>(Vector3<S>::Zero());
-      falls_[slot] = {a, detail::safeNorm(a)};
-      b.inverseMass = movable ? S(source.masses()[i]) : S(0);  // the mass, until its scale is known
-      b.spin = movable && r > S(0) && k > S(0) ? S(1) / k : S(0);
-      fastest = std::max<S>(fastest, std::max<S>(detail::maxAbs(b.v), detail::maxAbs(b.s)));
-      if (movable) {
-        heaviest = std::max<S>(heaviest, b.inverseMass);
-        lightest = lightest > S(0) ? std::min<S>(lightest, b.inverseMass) : b.inverseMass;
-      }
-    }
+      return part;
+    });
     falls_[n] = {Vector3<S>::Zero(), S(0)};
     bodies[n] = Body{Vector3<S>::Zero(), S(0), Vector3<S>::Zero(), S(0)};
-    speedExponent_ = detail::scaleExponent<S>(fastest, fastest);
-    massExponent_ = detail::scaleExponent<S>(lightest, heaviest);
-    for (std::size_t slot = 0; slot < n; ++slot) {
+    speedExponent_ = detail::scaleExponent<S>(scales.fastest, scales.fastest);
+    massExponent_ = detail::scaleExponent<S>(scales.lightest, scales.heaviest);
+    parallelFor(n + 1, chunk, [&](std::size_t slot) {
       Body& b = bodies[slot];
       if (speedExponent_ != 0) {
         b.v = detail::scaled<S>(b.v, speedExponent_);
@@ -179,8 +163,25 @@ class ContactProblem {
         b.inverseMass = S(1) / detail::scaled<S>(b.inverseMass, massExponent_);
         b.spin *= b.inverseMass;
       }
-    }
-    initial = bodies;
+      initial[slot] = b;
+    });
+  }
+
+  template <class B>
+  Scales take(const B& source, const ContactColoring& colouring, std::size_t slot) {
+    const std::uint32_t i = colouring.bodies()[slot];
+    Body& b = bodies[slot];
+    const bool movable = colouring.movable(static_cast<std::uint32_t>(slot));
+    const S r = source.radii()[i];
+    const S k = source.inertiaFactors()[i];
+    b.v = source.velocities()[i];
+    b.s =
+        friction ? Vector3<S>(r * Vector3<S>(source.angularVelocities()[i])) : Vector3<S>(Vector3<S>::Zero());
+    const Vector3<S> a = movable ? Vector3<S>(source.accelerations()[i]) : Vector3<S>(Vector3<S>::Zero());
+    falls_[slot] = {a, detail::safeNorm(a)};
+    b.inverseMass = movable ? S(source.masses()[i]) : S(0);  // the mass, until its scale is known
+    b.spin = movable && r > S(0) && k > S(0) ? S(1) / k : S(0);
+    return {std::max<S>(detail::maxAbs(b.v), detail::maxAbs(b.s)), b.inverseMass, b.inverseMass};
   }
 
   /// What stays while bodies and surfaces stay.

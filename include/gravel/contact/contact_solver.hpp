@@ -56,10 +56,13 @@ class ContactSolver {
     contacts_ = contacts;
     fresh_ = true;
     const bool same = sameAsBefore(contacts, bodies);
-    kinds_ = {};
-    for (const Contact<S>& c : contacts) {
-      kinds_.include(c);
-    }
+    kinds_ = orderedSum(contacts.size(), chunk, ContactKinds{}, [&](std::size_t begin, std::size_t end) {
+      ContactKinds kinds;
+      for (std::size_t k = begin; k < end; ++k) {
+        kinds.include(contacts[k]);
+      }
+      return kinds;
+    });
     if (!same) {
       coloring_.build(contacts, bodies);
       handOn(contacts);
@@ -153,6 +156,8 @@ class ContactSolver {
     friend bool operator==(const Name&, const Name&) = default;
   };
 
+  static constexpr std::size_t chunk = 1024;
+
   static Name nameOf(const Contact<S>& c) { return {{c.key1, c.key2}, c.first, c.second}; }
 
   /// The same pairs of the same bodies: colours, and who is remembered, stay.
@@ -176,21 +181,23 @@ class ContactSolver {
 
   void handOn(std::span<const Contact<S>> contacts) {
     before_.swap(impulses_);
-    impulses_.assign(contacts.size(), ContactImpulse<S>{});
-    std::size_t m = 0;
-    for (std::size_t k = 0; k < contacts.size() && m < names_.size(); ++k) {
-      const ContactKeys keys{contacts[k].key1, contacts[k].key2};
-      while (m < names_.size() && names_[m].keys < keys) {
-        ++m;
-      }
-      if (m < names_.size() && names_[m].keys == keys) {
-        impulses_[k] = before_[m];
-      }
-    }
+    namesBefore_.swap(names_);
+    impulses_.resize(contacts.size());
     names_.resize(contacts.size());
-    for (std::size_t k = 0; k < contacts.size(); ++k) {
-      names_[k] = nameOf(contacts[k]);
-    }
+    parallelForChunks(contacts.size(), chunk, [&](std::size_t begin, std::size_t end) {
+      const auto earlier = [](const Name& name, const ContactKeys& keys) { return name.keys < keys; };
+      auto old =
+          std::lower_bound(namesBefore_.begin(), namesBefore_.end(), nameOf(contacts[begin]).keys, earlier);
+      for (std::size_t k = begin; k < end; ++k) {
+        names_[k] = nameOf(contacts[k]);
+        while (old != namesBefore_.end() && old->keys < names_[k].keys) {
+          ++old;
+        }
+        const bool known = old != namesBefore_.end() && old->keys == names_[k].keys;
+        impulses_[k] =
+            known ? before_[static_cast<std::size_t>(old - namesBefore_.begin())] : ContactImpulse<S>{};
+      }
+    });
   }
 
   std::variant<SequentialImpulses<S>> algorithm_;
@@ -203,6 +210,7 @@ class ContactSolver {
   std::span<const Contact<S>> contacts_;
   std::vector<Name> names_;                  ///< of the contacts of begin(), or of the memory put back
   std::vector<ContactImpulse<S>> impulses_;  ///< in that order
+  std::vector<Name> namesBefore_;
   std::vector<ContactImpulse<S>> before_;
   S memoryStep_ = S(0);
   bool fresh_ = true;  ///< contacts may be elsewhere than at the last gathering

@@ -8,6 +8,7 @@
 #include <gravel/core/parallel.hpp>
 #include <gravel/spatial/pair.hpp>
 
+#include <algorithm>
 #include <optional>
 #include <span>
 #include <string>
@@ -71,22 +72,7 @@ class NarrowPhase {
     gather(pairs.size(), [&](std::size_t k, std::vector<Contact<S>>& part, Cursor& cursor) {
       appendPair(pairs[k], bodies, domain, materials, settings, part, cursor);
     });
-    out.clear();
-    std::size_t total = boundaryContacts_.size();
-    for (const std::vector<Contact<S>>& part : std::span(parts_).first(used_)) {
-      total += part.size();
-    }
-    out.reserve(total);
-    auto wall = boundaryContacts_.begin();
-    for (const std::vector<Contact<S>>& part : std::span(parts_).first(used_)) {
-      for (const Contact<S>& contact : part) {
-        while (wall != boundaryContacts_.end() && keysBefore(*wall, contact)) {
-          out.push_back(*wall++);
-        }
-        out.push_back(contact);
-      }
-    }
-    out.insert(out.end(), wall, boundaryContacts_.end());
+    merge(out);
   }
 
   /// The largest gap of a resting contact over the sum of the radii.
@@ -116,6 +102,32 @@ class NarrowPhase {
         append(k, part, cursor);
       }
     });
+  }
+
+  /// Pairs and boundaries in the order of keys, part by part.
+  void merge(std::vector<Contact<S>>& out) {
+    const auto before = [](const Contact<S>& a, const Contact<S>& b) { return keysBefore(a, b); };
+    starts_.assign(1, {0, 0});
+    for (std::size_t p = 0; p < used_; ++p) {
+      Start next = starts_.back();
+      if (!parts_[p].empty()) {
+        const auto end =
+            std::lower_bound(boundaryContacts_.begin(), boundaryContacts_.end(), parts_[p].back(), before);
+        next.wall = static_cast<std::size_t>(end - boundaryContacts_.begin());
+        next.place += parts_[p].size() + next.wall - starts_.back().wall;
+      }
+      starts_.push_back(next);
+    }
+    const Start last = starts_.back();
+    out.resize(last.place + boundaryContacts_.size() - last.wall);
+    parallelForTasks(used_, [&](std::size_t p) {
+      const auto wall = boundaryContacts_.begin();
+      std::merge(parts_[p].begin(), parts_[p].end(), wall + static_cast<std::ptrdiff_t>(starts_[p].wall),
+                 wall + static_cast<std::ptrdiff_t>(starts_[p + 1].wall),
+                 out.begin() + static_cast<std::ptrdiff_t>(starts_[p].place), before);
+    });
+    std::copy(boundaryContacts_.begin() + static_cast<std::ptrdiff_t>(last.wall), boundaryContacts_.end(),
+              out.begin() + static_cast<std::ptrdiff_t>(last.place));
   }
 
   template <class B>
@@ -221,7 +233,14 @@ class NarrowPhase {
     }
   }
 
+  /// Where a part begins among the boundaries' contacts and in the list.
+  struct Start {
+    std::size_t wall;
+    std::size_t place;
+  };
+
   std::vector<std::vector<Contact<S>>> parts_;
+  std::vector<Start> starts_;
   std::size_t used_ = 0;
   std::vector<Contact<S>> boundaryContacts_;
 };

@@ -115,6 +115,18 @@ class PositionalCorrection {
     std::uint32_t slot2;
     bool boundary;
   };
+  static constexpr std::size_t chunk = 1024;
+
+  /// The largest overlap, and the smallest radius.
+  struct Extremes {
+    S overlap = S(0);
+    S radius = Eigen::NumTraits<S>::highest();
+    Extremes& operator+=(const Extremes& other) {
+      overlap = std::max<S>(overlap, other.overlap);
+      radius = std::min<S>(radius, other.radius);
+      return *this;
+    }
+  };
   /// What a sweep did.
   struct Opened {
     S largest = S(0);
@@ -131,43 +143,52 @@ class PositionalCorrection {
                const CorrectionSettings<S>& settings, CorrectionReport<S>& report) {
     const std::size_t n = colouring.bodies().size();
     shifts_.resize(n + 1);
-    for (std::uint32_t slot = 0; slot <= n; ++slot) {
-      const bool movable = colouring.movable(slot);
+    parallelFor(n + 1, chunk, [&](std::size_t slot) {
+      const bool movable = colouring.movable(static_cast<std::uint32_t>(slot));
       const std::uint32_t i = movable ? colouring.bodies()[slot] : 0;
       shifts_[slot] = {Vector3<S>::Zero(), movable ? S(bodies.masses()[i]) : S(0),
                        movable ? Vector3<S>(bodies.velocities()[i]) : Vector3<S>(Vector3<S>::Zero()),
                        Vector3<S>::Zero()};
-    }
+    });
     rows_.resize(contacts.size());
-    for (std::size_t k = 0; k < rows_.size(); ++k) {
-      const ContactColoring::Row& place = colouring.rows()[k];
-      const Contact<S>& c = contacts[place.contact];
-      const S overlap = -c.gap;
-      report.largestOverlap = std::max<S>(report.largestOverlap, overlap);
-      const bool boundary = c.second == staticPartner;
-      const S r1 = bodies.radii()[c.first];
-      const S r2 = boundary ? r1 : S(bodies.radii()[c.second]);
-      const S smaller = r1 > S(0) && r2 > S(0) ? std::min<S>(r1, r2) : std::max<S>(r1, r2);
-      smallest_ = k == 0 ? smaller : std::min<S>(smallest_, smaller);
-      const S kept =
-          std::max<S>(overlap - settings.cap * smaller,
-                      std::max<S>((S(1) - settings.factor) * overlap, std::min<S>(settings.slop, overlap)));
-      const S m1 = shifts_[place.slot1].mass;
-      const S m2 = shifts_[place.slot2].mass;
-      const MassShares<S> shares = massShares<S>(m1, m1 > S(0), m2, m2 > S(0));
-      const S distance = boundary ? S(0) : c.arm1 + c.arm2;
-      rows_[k] = Row{Vector3<S>(distance * c.normal),
-                     c.normal,
-                     distance - c.gap - kept,
-                     shares.first,
-                     shares.second,
-                     place.slot1,
-                     place.slot2,
-                     boundary};
-      if (boundary) {
-        rows_[k].reach = overlap - kept;  // travel along the normal that remains to be made
+    const Extremes all = orderedSum(rows_.size(), chunk, Extremes{}, [&](std::size_t begin, std::size_t end) {
+      Extremes part;
+      for (std::size_t k = begin; k < end; ++k) {
+        part += fill(k, contacts, colouring, bodies, settings);
       }
-    }
+      return part;
+    });
+    report.largestOverlap = all.overlap;
+    smallest_ = rows_.empty() ? S(0) : all.radius;
+  }
+
+  template <class B>
+  Extremes fill(std::size_t k, std::span<const Contact<S>> contacts, const ContactColoring& colouring,
+                const B& bodies, const CorrectionSettings<S>& settings) {
+    const ContactColoring::Row& place = colouring.rows()[k];
+    const Contact<S>& c = contacts[place.contact];
+    const S overlap = -c.gap;
+    const bool boundary = c.second == staticPartner;
+    const S r1 = bodies.radii()[c.first];
+    const S r2 = boundary ? r1 : S(bodies.radii()[c.second]);
+    const S smaller = r1 > S(0) && r2 > S(0) ? std::min<S>(r1, r2) : std::max<S>(r1, r2);
+    const S kept =
+        std::max<S>(overlap - settings.cap * smaller,
+                    std::max<S>((S(1) - settings.factor) * overlap, std::min<S>(settings.slop, overlap)));
+    const S m1 = shifts_[place.slot1].mass;
+    const S m2 = shifts_[place.slot2].mass;
+    const MassShares<S> shares = massShares<S>(m1, m1 > S(0), m2, m2 > S(0));
+    const S distance = boundary ? S(0) : c.arm1 + c.arm2;
+    // To a boundary `reach` is the travel along the normal that remains to be made.
+    rows_[k] = Row{Vector3<S>(distance * c.normal),
+                   c.normal,
+                   boundary ? S(overlap - kept) : S(distance - c.gap - kept),
+                   shares.first,
+                   shares.second,
+                   place.slot1,
+                   place.slot2,
+                   boundary};
+    return {overlap, smaller};
   }
 
   Opened open(std::size_t k, bool keepAngularMomentum) {

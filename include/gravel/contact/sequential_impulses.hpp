@@ -172,6 +172,11 @@ class SequentialImpulses : private detail::RowImpulses<S> {
   template <bool Friction>
   static Progress relax(ContactProblem<S>& problem, std::size_t k, const S& beta) {
     Row& row = problem.rows[k];
+    if (k + ContactProblem<S>::lookAhead < problem.rows.size()) {
+      const Row& later = problem.rows[k + ContactProblem<S>::lookAhead];
+      detail::prefetch(problem.bodies[later.slot1]);
+      detail::prefetch(problem.bodies[later.slot2]);
+    }
     Body& b1 = problem.bodies[row.slot1];
     Body& b2 = problem.bodies[row.slot2];
     const Vector3<S> v_rel = b2.v - b1.v;

@@ -11,12 +11,38 @@ namespace gravel {
 
 namespace detail {
 
+/// Asks for the cache lines of x, which will be needed soon.
+template <class T>
+[[gnu::always_inline]] inline void prefetch(const T& x) {
+  const char* const first = reinterpret_cast<const char*>(&x);
+  for (std::size_t byte = 0; byte < sizeof(T); byte += 64) {
+    __builtin_prefetch(first + byte);
+  }
+}
+
+/// In double a cache line.
 template <Real S>
-struct SolverBody {
+struct alignas(alignof(S) > 64 ? alignof(S) : 64) SolverBody {
   Vector3<S> v;
   S inverseMass;
   Vector3<S> s;  ///< r w: speed of the surface
   S spin;        ///< 1/(k m)
+};
+
+/// The largest speed, and the masses > 0.
+template <Real S>
+struct ProblemScales {
+  S fastest = S(0);
+  S lightest = S(0);
+  S heaviest = S(0);
+  ProblemScales& operator+=(const ProblemScales& other) {
+    fastest = std::max<S>(fastest, other.fastest);
+    heaviest = std::max<S>(heaviest, other.heaviest);
+    if (other.lightest > S(0) && !(lightest > S(0) && lightest <= other.lightest)) {
+      lightest = other.lightest;
+    }
+    return *this;
+  }
 };
 
 template <Real S>

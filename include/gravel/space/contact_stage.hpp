@@ -218,15 +218,22 @@ class ContactStage {
                  : Vector3<Scalar>(force.conservativeForce(bodies, i) * bodies[i].inverseMass());
     };
     const std::span<const ContactImpulse<Scalar>> impulses = solver_.impulses();
-    for (std::size_t k = 0; k < impulses.size(); ++k) {
-      const ContactImpulse<Scalar>& j = impulses[k];
-      if (j.normal > Scalar(0)) {
-        const Contact<Scalar>& c = contacts_[k];
-        const Vector3<Scalar> dv = (fall(c.second) - fall(c.first)) * kick;
-        report_.restitutionLoss += j.normal * c.normal.dot(dv);
-        report_.frictionLoss += j.tangential.dot(dv);
-      }
-    }
+    using Sums = Eigen::Array<Scalar, 2, 1>;
+    const Sums losses =
+        orderedSum(impulses.size(), 1024, Sums(Sums::Zero()), [&](std::size_t begin, std::size_t end) {
+          Sums sums = Sums::Zero();
+          for (std::size_t k = begin; k < end; ++k) {
+            const ContactImpulse<Scalar>& j = impulses[k];
+            if (j.normal > Scalar(0)) {
+              const Contact<Scalar>& c = contacts_[k];
+              const Vector3<Scalar> dv = (fall(c.second) - fall(c.first)) * kick;
+              sums += Sums(j.normal * c.normal.dot(dv), j.tangential.dot(dv));
+            }
+          }
+          return sums;
+        });
+    report_.restitutionLoss += losses[0];
+    report_.frictionLoss += losses[1];
   }
 
   void colour(const Bodies& bodies, Profiler& profiler) {

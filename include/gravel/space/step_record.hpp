@@ -5,7 +5,9 @@
 
 #include <gravel/contact/contact.hpp>
 #include <gravel/contact/impact.hpp>
+#include <gravel/core/parallel.hpp>
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -29,6 +31,16 @@ class StepRecord {
     sumsBefore_.swap(sums_);
     keys_.clear();
     sums_.clear();
+    if (keysBefore_.empty()) {
+      const std::size_t count = std::min(contacts.size(), impulses.size());
+      keys_.resize(count);
+      sums_.resize(count);
+      parallelFor(count, 1024, [&](std::size_t k) {
+        keys_[k] = {contacts[k].key1, contacts[k].key2};
+        sums_[k] = impulses[k];
+      });
+      return;
+    }
     std::size_t m = 0;
     for (std::size_t k = 0; k < contacts.size() && k < impulses.size(); ++k) {
       const ContactKeys keys{contacts[k].key1, contacts[k].key2};
