@@ -63,6 +63,7 @@ class Bodies {
         storage_.at(fields::InertiaFactor{}, i) = detail::homogeneousFactor<Scalar>();
       }
       proxy.setFixed(body.fixed);
+      proxy.setAsleep(false);
       storage_.at(fields::Id{}, i) = nextId_;
     }
   }

@@ -50,10 +50,11 @@ auto tileOf(Storage& storage, F field, std::size_t c, std::size_t i) {
   return Eigen::Map<Tile>(first);
 }
 
-/// Calls tiles(i) for the first body i of each tile of [begin, end) that holds no fixed body, where the
-/// storage has columns; one(k) for each body k that no tile holds.
+/// Calls tiles(i) for the first body i of each tile of [begin, end) that holds no fixed body, or none with
+/// any of the flags given, where the storage has columns; one(k) for each body k that no tile holds.
 template <class Storage, class Tiles, class One>
-void forTilesOrBodies(const Storage& storage, std::size_t begin, std::size_t end, Tiles&& tiles, One&& one) {
+void forTilesOrBodies(const Storage& storage, std::size_t begin, std::size_t end, Tiles&& tiles, One&& one,
+                      std::uint32_t flags = static_cast<std::uint32_t>(BodyFlag::Fixed)) {
   if constexpr (hasColumns<Storage>) {
     for (std::size_t i = begin; i < end; i += tileWidth) {
       const std::size_t last = std::min(end, i + tileWidth);
@@ -61,7 +62,7 @@ void forTilesOrBodies(const Storage& storage, std::size_t begin, std::size_t end
       for (std::size_t k = i; k < last; ++k) {
         any |= storage.at(fields::Flags{}, k);
       }
-      if ((any & static_cast<std::uint32_t>(BodyFlag::Fixed)) == 0) {
+      if ((any & flags) == 0) {
         tiles(i);
       } else {
         for (std::size_t k = i; k < last; ++k) {

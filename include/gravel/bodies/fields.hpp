@@ -77,7 +77,14 @@ struct Flags {  // bits of BodyFlag
 }  // namespace fields
 
 /// Bits of the flags field.
-enum class BodyFlag : std::uint32_t { Fixed = 1U };
+enum class BodyFlag : std::uint32_t {
+  Fixed = 1U,
+  Asleep = 2U,  ///< at rest until something wakes it; set by the space alone
+};
+
+/// Either of them: neither forces nor contacts move the body now.
+inline constexpr std::uint32_t heldFlags =
+    static_cast<std::uint32_t>(BodyFlag::Fixed) | static_cast<std::uint32_t>(BodyFlag::Asleep);
 
 template <class... Fields>
 struct FieldList {

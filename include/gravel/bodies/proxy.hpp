@@ -42,6 +42,9 @@ class BasicBodyProxy {
   std::size_t index() const { return index_; }
   MaterialId material() const { return MaterialId{at(fields::Material{})}; }
   bool isFixed() const { return (at(fields::Flags{}) & static_cast<std::uint32_t>(BodyFlag::Fixed)) != 0; }
+  bool isAsleep() const { return (at(fields::Flags{}) & static_cast<std::uint32_t>(BodyFlag::Asleep)) != 0; }
+  /// Fixed or asleep.
+  bool isHeld() const { return (at(fields::Flags{}) & heldFlags) != 0; }
 
   /// [kg m^2] about any axis through the centre: k m r^2.
   Scalar inertia() const {
@@ -71,6 +74,17 @@ class BasicBodyProxy {
     const auto bit = static_cast<std::uint32_t>(BodyFlag::Fixed);
     flags = fixed ? flags | bit : flags & ~bit;
     if (fixed) {
+      velocity() = Vector3<Scalar>::Zero().eval();
+      angularVelocity() = Vector3<Scalar>::Zero().eval();
+    }
+  }
+
+  /// For the space, which knows what woke it. A body that falls asleep stops.
+  void setAsleep(bool asleep) const requires(!IsConst) {
+    auto&& flags = at(fields::Flags{});
+    const auto bit = static_cast<std::uint32_t>(BodyFlag::Asleep);
+    flags = asleep ? flags | bit : flags & ~bit;
+    if (asleep) {
       velocity() = Vector3<Scalar>::Zero().eval();
       angularVelocity() = Vector3<Scalar>::Zero().eval();
     }

@@ -54,11 +54,11 @@ struct ContactArrays {
 
 namespace detail {
 
-/// True for a body that contacts can move: not fixed, and with a mass.
+/// True for a body that contacts can move: not fixed, not asleep, and with a mass.
 template <class B>
 bool isMovable(const B& bodies, std::size_t i) {
   using S = std::remove_cvref_t<decltype(bodies.masses()[i])>;
-  return (bodies.flags()[i] & static_cast<std::uint32_t>(BodyFlag::Fixed)) == 0 && bodies.masses()[i] > S(0);
+  return (bodies.flags()[i] & heldFlags) == 0 && bodies.masses()[i] > S(0);
 }
 
 /// True for a point without mass, which feels gravity and touches nothing.

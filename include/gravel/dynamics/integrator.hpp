@@ -14,12 +14,12 @@ namespace detail {
 
 constexpr std::size_t bodyGrain = 2048;
 
-/// v += a kick; then x += v drift, and the orientation with it, of one body; a fixed one stays.
+/// v += a kick; then x += v drift, and the orientation with it, of one body; one that is held stays.
 template <Real Scalar, class Layout>
 void kickAndDriftOne(Bodies<Scalar, Layout>& bodies, std::size_t i, const Scalar& kick, const Scalar& drift,
                      bool torques, Compensation<Scalar>* lost) {
   const auto body = bodies[i];
-  if (body.isFixed()) {
+  if (body.isHeld()) {
     return;
   }
   if (!(kick == Scalar(0))) {
@@ -101,7 +101,7 @@ void kickAndDrift(Bodies<Scalar, Layout>& bodies, const Scalar& kick, const Scal
     forTilesOrBodies(
         bodies.storage(), begin, end,
         [&](std::size_t i) { kickAndDriftTile(bodies, i, end, kick, drift, torques, lost); },
-        [&](std::size_t i) { kickAndDriftOne(bodies, i, kick, drift, torques, lost); });
+        [&](std::size_t i) { kickAndDriftOne(bodies, i, kick, drift, torques, lost); }, heldFlags);
   });
 }
 
@@ -112,7 +112,7 @@ void extrapolateForces(Bodies<Scalar, Layout>& bodies, const Scalar& shift, Forc
   parallelFor(bodies.size(), bodyGrain, [&](std::size_t i) {
     const auto body = bodies[i];
     places[i] = body.position();
-    if (!body.isFixed()) {
+    if (!body.isHeld()) {
       body.position() += body.acceleration() * shift;
     }
   });

@@ -201,6 +201,23 @@ class ContactStage {
   /// not among them. O(contacts).
   std::vector<ContactImpulse<Scalar>> impulses() const { return record_.sum(contacts_, solver_.impulses()); }
 
+  // Of bodies that sleep: contact_stage_sleep.hpp.
+
+  /// Nothing that contacts can move is awake: there is no search.
+  void setIdle(bool idle) { idle_ = idle; }
+  bool isIdle() const { return idle_; }
+  /// Calls visit(i) for every held body i that a movable one comes near to within h [s].
+  template <class Visit>
+  void forEachApproach(const Bodies& bodies, const Config& config, const Scalar& time, const Scalar& h,
+                       Profiler& profiler, Visit&& visit);
+  /// What the next solve goes on from, and the step [s] that it stands for.
+  std::vector<StoredImpulse<Scalar>> memory() const { return solver_.memory(); }
+  const Scalar& memoryStep() const { return solver_.memoryStep(); }
+  /// Contacts that nothing can move at either end leave the list, and are forgotten.
+  void dropHeld(const Bodies& bodies);
+  /// Contacts join the list, with what is remembered of them.
+  void add(std::vector<Contact<Scalar>> contacts, const std::vector<StoredImpulse<Scalar>>& memory);
+
   void save(SnapshotWriter& out) const;
   /// \throws std::runtime_error, std::invalid_argument if the file does not hold what save() writes
   void load(SnapshotReader& in);
@@ -262,6 +279,9 @@ class ContactStage {
   void rememberResting();
 
   const char* reasonToSkip(const Bodies& bodies) const {
+    if (idle_) {
+      return "every body is fixed or asleep";
+    }
     if (bodies.size() < 2 && boundaries.empty()) {
       return "one body and no boundary";
     }
@@ -287,6 +307,7 @@ class ContactStage {
   StepRecord<Scalar> record_;
   ContactReport<Scalar> report_;
   Scalar separationLoss_ = Scalar(0);
+  bool idle_ = false;
   bool moved_ = false;
   bool acted_ = false;     // the last solve changed velocities
   bool coloured_ = false;  // solver_ knows the present contacts
@@ -295,3 +316,4 @@ class ContactStage {
 }  // namespace gravel
 
 #include <gravel/space/contact_stage_search.hpp>
+#include <gravel/space/contact_stage_sleep.hpp>

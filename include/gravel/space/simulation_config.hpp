@@ -47,6 +47,8 @@ struct SimulationConfig {
   Scalar contactTolerance = Scalar(1e-6);  ///< contact sweeps end when speeds change by less, relative
   std::size_t contactIterations = 200;     ///< most contact sweeps per step
   std::size_t contactSubsteps = 1;         ///< contact steps per force evaluation; 0: as motion asks
+  Scalar sleepSpeed = Scalar(0);           ///< [m s^-1] islands slower than this fall asleep; 0: none does
+  Scalar sleepTime = Scalar(0.5);          ///< [s] for which they must have been slower
   BroadPhaseKind broadPhase = BroadPhaseKind::Automatic;
   bool diagnosticsEnabled = false;  ///< log energies and warn of instability
   std::size_t logFrequency = 100;   ///< steps between two lines of that log
@@ -123,6 +125,8 @@ void forEachSetting(Config& c, Visitor&& visit) {
   visit(S{"contactTolerance", "1", tolerance}, c.contactTolerance);
   visit(S{"contactIterations", "1", any}, c.contactIterations);
   visit(S{"contactSubsteps", "1", any}, c.contactSubsteps);
+  visit(S{"sleepSpeed", "m s^-1", any}, c.sleepSpeed);
+  visit(S{"sleepTime", "s", positive}, c.sleepTime);
   visit(S{"broadPhase", "", any}, c.broadPhase);
   visit(S{"diagnosticsEnabled", "", any}, c.diagnosticsEnabled);
   visit(S{"logFrequency", "1", any}, c.logFrequency);
@@ -156,6 +160,12 @@ void SimulationConfig<Scalar>::validate() const {
     fault("contactSubsteps", std::to_string(contactSubsteps),
           std::string("1 with ") + traitsOf(integrator).name +
               "; others need one drift a step, VelocityVerlet or SymplecticEpicycle");
+  }
+  if (sleepSpeed > Scalar(0) &&
+      (!traitsOf(integrator).contacts || integrator == IntegratorKind::SymplecticEpicycle)) {
+    fault("sleepSpeed", detail::formatReal(sleepSpeed),
+          std::string("0 with ") + traitsOf(integrator).name +
+              (traitsOf(integrator).contacts ? ", in whose frame nothing rests" : ", which moves points"));
   }
   if (logFrequency == 0) {
     fault("logFrequency", "0", ">= 1");

@@ -18,6 +18,7 @@
 #include <gravel/space/place_tile.hpp>
 #include <gravel/space/random_bodies.hpp>
 #include <gravel/space/settings.hpp>
+#include <gravel/space/sleep_stage.hpp>
 
 #include <string>
 #include <tuple>
@@ -109,6 +110,10 @@ class Space : public Settings<Scalar> {
   void setDomain(const Domain<Scalar>& domain);
   const Domain<Scalar>& domain() const { return contact_.domain; }
 
+  /// Every body is awake again before the next step (see space/sleep_stage.hpp). Changes of forces and planes
+  /// do so by themselves, changes of bodies for those that they concern.
+  void wakeAll() { sleep_.wakeAll(); }
+
   // Time.
 
   /// One full step: advance, collide, forces, damping, next step size. An empty space only lets time pass.
@@ -142,7 +147,8 @@ class Space : public Settings<Scalar> {
   /// Positions, orientations, torques, angular accelerations.
   std::tuple<std::vector<Vector>, std::vector<Quaternion<Scalar>>, std::vector<Vector>, std::vector<Vector>>
   getDataForDisplay() const;
-  /// Pairs that touched in the last step: contacts() and impacts(), each pair once.
+  /// Pairs that touched in the last step: contacts() and impacts(), each pair once. Contacts inside a heap
+  /// that sleeps are not among them, here and in contacts(); weights and virials count them.
   std::size_t contactCount() const { return contact_.touches(); }
   /// What the contact solver reached in the last step.
   const ContactReport<Scalar>& contactReport() const { return contact_.report(); }
@@ -217,6 +223,9 @@ class Space : public Settings<Scalar> {
   std::size_t chooseParts(const Scalar& h) const;
   void advance(const Scalar& h, std::size_t part, std::size_t parts);
   void prepare();
+  void wakeTheChanged();
+  void fallAsleep();
+  typename ContactStage<Scalar, Layout>::Touches allTouches() const;
   void rememberPlaces();
   bool placesChanged() const;
   Material<Scalar> pairMaterial(const CollisionContext& ctx) const;
@@ -235,6 +244,7 @@ class Space : public Settings<Scalar> {
   Bodies bodies_;
   mutable ForceStage<Scalar, Layout> force_;  // its workspace serves const queries too
   ContactStage<Scalar, Layout> contact_;
+  SleepStage<Scalar, Layout> sleep_;
   std::vector<int> colors_;
   Profiler profiler_;
   Callback<void(const char*)> log_;
@@ -265,6 +275,7 @@ class Space : public Settings<Scalar> {
 
 #include <gravel/space/space_collisions.hpp>
 #include <gravel/space/space_setup.hpp>
+#include <gravel/space/space_sleep.hpp>
 #include <gravel/space/space_state.hpp>
 #include <gravel/space/space_step.hpp>
 #include <gravel/space/space_substeps.hpp>

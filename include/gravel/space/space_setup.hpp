@@ -78,6 +78,7 @@ void Space<Scalar, Layout>::reorderBodies() {
 template <Real Scalar, class Layout>
 std::size_t Space<Scalar, Layout>::addPlane(const Vector& normal, Scalar offset, MaterialId material) {
   contact_.materials.check(static_cast<std::uint32_t>(material), "the body or plane");
+  wakeAll();
   return contact_.boundaries.add(makePlane(normal, offset, material));
 }
 
@@ -85,6 +86,7 @@ template <Real Scalar, class Layout>
 std::vector<std::size_t> Space<Scalar, Layout>::addBox(const Vector& low, const Vector& high,
                                                        MaterialId material, BoxFaces open) {
   contact_.materials.check(static_cast<std::uint32_t>(material), "the body or plane");
+  wakeAll();
   std::vector<std::size_t> numbers;
   for (const Plane<Scalar>& face : makeBox(low, high, material, open)) {
     numbers.push_back(contact_.boundaries.add(face));
@@ -95,6 +97,7 @@ std::vector<std::size_t> Space<Scalar, Layout>::addBox(const Vector& low, const 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::removePlane(std::size_t plane) {
   contact_.boundaries.remove(plane);
+  wakeAll();
   forcesValid_ = false;  // contacts are looked for again before the next step
 }
 
@@ -114,6 +117,7 @@ void Space<Scalar, Layout>::setUniformField(const Vector& g) {
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::setForceHook(ForceHook<Scalar, Layout> hook) {
   force_.hook = std::move(hook);
+  wakeAll();
   for (std::size_t i = 0; i < n() && !force_.hook; ++i) {
     bodies_[i].torque() = Vector::Zero().eval();
     bodies_[i].angularAcceleration() = Vector::Zero().eval();
@@ -140,6 +144,7 @@ void Space<Scalar, Layout>::setDomain(const Domain<Scalar>& domain) {
     changePotential([&] { contact_.domain = domain; });
   } else {
     contact_.domain = domain;
+    wakeAll();
   }
 }
 
@@ -163,6 +168,7 @@ template <class Change>
 void Space<Scalar, Layout>::changePotential(Change&& change) {
   const Scalar before = ledgerOpen_ ? potentialEnergy() : Scalar(0);
   change();
+  wakeAll();
   if (ledgerOpen_) {
     left_.exchange += before - potentialEnergy();
   }

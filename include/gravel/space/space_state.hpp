@@ -60,13 +60,13 @@ auto Space<Scalar, Layout>::getDataForDisplay() const
 
 template <Real Scalar, class Layout>
 ContactVirial<Scalar> Space<Scalar, Layout>::contactVirial() const {
-  const auto touches = contact_.allTouches();
+  const auto touches = allTouches();
   return gravel::contactVirial<Scalar, Layout>(bodies_, touches.contacts, touches.impulses, previous_dt_);
 }
 
 template <Real Scalar, class Layout>
 SupportedWeight<Scalar> Space<Scalar, Layout>::supportedWeight() const {
-  const auto touches = contact_.allTouches();
+  const auto touches = allTouches();
   return gravel::supportedWeight<Scalar, Layout>(bodies_, touches.contacts, touches.impulses, previous_dt_,
                                                  force_.field);
 }
@@ -75,7 +75,7 @@ template <Real Scalar, class Layout>
 auto Space<Scalar, Layout>::planeForce(std::size_t plane) const -> Vector {
   (void)contact_.boundaries.at(plane);
   Vector impulse = Vector::Zero();
-  const auto touches = contact_.allTouches();
+  const auto touches = allTouches();
   for (std::size_t k = 0; k < touches.contacts.size(); ++k) {
     if (touches.contacts[k].key2 == boundaryKey(plane)) {
       impulse += touches.impulses[k].normal * touches.contacts[k].normal + touches.impulses[k].tangential;
@@ -215,6 +215,7 @@ void Space<Scalar, Layout>::save(const std::string& path) const {
       !forcesValid_ || placesChanged() ? std::uint64_t{1} : std::uint64_t{0}};
   numbers.forEach([&](const char* name, const auto& value) { out.value(name, value); });
   contact_.save(out);
+  sleep_.save(out);
   saveBodies(bodies_, out);
   const std::vector<Scalar> lost = lost_.lostParts(bodies_);
   out.array("lost parts", lost.data(), lost.size());
@@ -235,6 +236,8 @@ void Space<Scalar, Layout>::restore(const std::string& path) {
   numbers.forEach([&]<class T>(const char* name, T& value) { value = in.value<T>(name); });
   ContactStage<Scalar, Layout> contact;
   contact.load(in);
+  SleepStage<Scalar, Layout> sleep;
+  sleep.load(in);
   gravel::Bodies<Scalar, SoA> bodies = loadBodies<Scalar>(in);
   bodies.skipIds(BodyId{numbers.nextId});
   const std::vector<Scalar> lost = in.array<Scalar>("lost parts");
@@ -248,6 +251,7 @@ void Space<Scalar, Layout>::restore(const std::string& path) {
   this->config_ = config;
   contact.collisionHook = std::move(contact_.collisionHook);
   contact_ = std::move(contact);
+  sleep_ = std::move(sleep);
   force_.gravity.setKind(config.gravity);
   force_.gravity.setTolerance(config.gravityTolerance);
   force_.field = numbers.field;

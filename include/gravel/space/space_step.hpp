@@ -68,6 +68,9 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration) {
     left_.friction += contact_.report().frictionLoss;
     left_.work -= contact_.report().driftWork;
     applyDamping();
+    if (this->config_.sleepSpeed > Scalar(0)) {
+      sleep_.settle(bodies_, contact_, this->config_, h);
+    }
     if (force_.hook) {
       hookPower_ = force_.hookPower(bodies_);
     }
@@ -91,6 +94,7 @@ void Space<Scalar, Layout>::prepare() {
   bodies_.validateAll();
   contact_.materials.check(bodies_);
   orbits_.check(this->config_.integrator, bodies_, contact_, force_);
+  wakeTheChanged();
   while (!forcesValid_ || placesChanged()) {
     applyGravity();
     buildCollisionGraph();
@@ -100,6 +104,7 @@ void Space<Scalar, Layout>::prepare() {
     updateAdaptiveTimeStep();
     decideTouching();
   }
+  fallAsleep();
 }
 
 template <Real Scalar, class Layout>

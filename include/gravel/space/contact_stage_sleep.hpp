@@ -1,0 +1,87 @@
+#pragma once
+
+/// \file
+/// Members of `ContactStage` that concern bodies which fall asleep and wake.
+
+#include <gravel/space/contact_stage.hpp>
+
+namespace gravel {
+
+/// On the straight way to the place at h; a path that is bent misses that by |a| h^2/8, less than the margin
+/// of what rests where steps resolve anything.
+template <Real Scalar, class Layout>
+template <class Visit>
+void ContactStage<Scalar, Layout>::forEachApproach(const Bodies& bodies, const Config& config,
+                                                   const Scalar& time, const Scalar& h, Profiler& profiler,
+                                                   Visit&& visit) {
+  if (reasonToSkip(bodies) != nullptr) {
+    return;
+  }
+  const auto way = [&](std::size_t i) -> Vector3<Scalar> {
+    return detail::isMovable(bodies, i)
+               ? Vector3<Scalar>((Vector3<Scalar>(bodies.velocities()[i]) +
+                                  Vector3<Scalar>(bodies.accelerations()[i]) * (h / Scalar(2))) *
+                                 h)
+               : Vector3<Scalar>(Vector3<Scalar>::Zero());
+  };
+  search(bodies, config, time, way, profiler);
+  for (const Pair& pair : neighbours_.pairs()) {
+    const bool firstMoves = detail::isMovable(bodies, pair.first);
+    if (firstMoves == detail::isMovable(bodies, pair.second)) {
+      continue;
+    }
+    const std::uint32_t one = firstMoves ? pair.first : pair.second;
+    const std::uint32_t held = firstMoves ? pair.second : pair.first;
+    const Vector3<Scalar> w = way(one);
+    const Vector3<Scalar> r = domain.minimumImage(
+        Vector3<Scalar>(Vector3<Scalar>(bodies.positions()[held]) - bodies.positions()[one]), time);
+    const Scalar w_sq = w.squaredNorm();
+    const Scalar share =
+        w_sq > Scalar(0) ? std::clamp<Scalar>(r.dot(w) / w_sq, Scalar(0), Scalar(1)) : Scalar(0);
+    const Scalar reach = Scalar(bodies.radii()[one]) + Scalar(bodies.radii()[held]) + margin_;
+    if (Vector3<Scalar>(r - share * w).squaredNorm() < reach * reach) {
+      visit(held);
+    }
+  }
+}
+
+template <Real Scalar, class Layout>
+void ContactStage<Scalar, Layout>::dropHeld(const Bodies& bodies) {
+  const std::vector<StoredImpulse<Scalar>> before = solver_.memory();
+  std::erase_if(contacts_, [&](const Contact<Scalar>& c) {
+    return !detail::isMovable(bodies, c.first) &&
+           (c.second == staticPartner || !detail::isMovable(bodies, c.second));
+  });
+  std::vector<StoredImpulse<Scalar>> memory;
+  auto next = contacts_.begin();
+  for (const StoredImpulse<Scalar>& stored : before) {
+    const ContactKeys keys{stored.key1, stored.key2};
+    while (next != contacts_.end() && ContactKeys{next->key1, next->key2} < keys) {
+      ++next;
+    }
+    if (next != contacts_.end() && ContactKeys{next->key1, next->key2} == keys) {
+      memory.push_back(stored);
+    }
+  }
+  solver_.setMemory(memory, solver_.memoryStep());
+  coloured_ = false;
+  moved_ = false;
+}
+
+template <Real Scalar, class Layout>
+void ContactStage<Scalar, Layout>::add(std::vector<Contact<Scalar>> contacts,
+                                       const std::vector<StoredImpulse<Scalar>>& memory) {
+  std::vector<StoredImpulse<Scalar>> all = solver_.memory();
+  all.insert(all.end(), memory.begin(), memory.end());
+  std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) {
+    return ContactKeys{a.key1, a.key2} < ContactKeys{b.key1, b.key2};
+  });
+  solver_.setMemory(all, solver_.memoryStep());
+  contacts_.insert(contacts_.end(), contacts.begin(), contacts.end());
+  std::sort(contacts_.begin(), contacts_.end(),
+            [](const Contact<Scalar>& a, const Contact<Scalar>& b) { return keysBefore(a, b); });
+  coloured_ = false;
+  moved_ = false;
+}
+
+}  // namespace gravel

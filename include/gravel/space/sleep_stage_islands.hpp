@@ -1,0 +1,124 @@
+#pragma once
+
+/// \file
+/// Members of `SleepStage` that make islands and undo them.
+
+#include <gravel/space/sleep_stage.hpp>
+
+namespace gravel {
+
+/// Islands all of whose bodies have been slow for long enough, and which what they lean on carries.
+template <Real Scalar, class Layout>
+void SleepStage<Scalar, Layout>::findTired(const Bodies& bodies, const Contacts& contact,
+                                           const Config& config, const Scalar& h) {
+  groups_.find(std::span<const Contact<Scalar>>(contact.contacts()), bodies);
+  std::vector<unsigned char> rests(bodies.size(), 1);
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    if (!detail::isMovable(bodies, i) || slow_[i] < config.sleepTime) {
+      rests[groups_.of(i)] = 0;
+    }
+  }
+  std::vector<std::uint32_t> groupAt(bodies.size(), none);
+  std::vector<SleepingIsland<Scalar>> found;
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const std::uint32_t root = groups_.of(i);
+    if (rests[root] == 0) {
+      continue;
+    }
+    if (groupAt[root] == none) {
+      groupAt[root] = static_cast<std::uint32_t>(found.size());
+      found.emplace_back();
+      found.back().span = h;
+    }
+    found[groupAt[root]].members.push_back(RestingBody<Scalar>::of(bodies[i]));
+  }
+  if (found.empty()) {
+    return;
+  }
+  const std::vector<ContactImpulse<Scalar>> impulses = contact.impulses();
+  std::vector<Vector3<Scalar>> push(found.size(), Vector3<Scalar>::Zero());
+  for (std::size_t k = 0; k < contact.contacts().size(); ++k) {
+    const Contact<Scalar>& c = contact.contacts()[k];
+    const bool firstMoves = detail::isMovable(bodies, c.first);
+    const std::uint32_t place = groupAt[groups_.of(firstMoves ? c.first : c.second)];
+    if (place == none) {
+      continue;
+    }
+    found[place].contacts.push_back(c);
+    found[place].impulses.push_back(impulses[k]);
+    const Vector3<Scalar> j = impulses[k].normal * c.normal + impulses[k].tangential;
+    if (c.second == staticPartner) {
+      push[place] -= j;
+    } else if (!firstMoves || !detail::isMovable(bodies, c.second)) {
+      push[place] += firstMoves ? Vector3<Scalar>(-j) : j;
+      found[place].supports.push_back(RestingBody<Scalar>::of(bodies[firstMoves ? c.second : c.first]));
+    }
+  }
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    Scalar mass(0);
+    Scalar weight(0);
+    Vector3<Scalar> net = push[k];
+    for (const RestingBody<Scalar>& body : found[k].members) {
+      mass += body.mass;
+      weight += body.mass * detail::safeNorm(body.acceleration);
+      net += body.mass * h * body.acceleration;
+    }
+    found[k].fall = weight / mass;
+    if (!(detail::safeNorm(net) * Scalar(16) > weight * h)) {
+      islands_.push_back(std::move(found[k]));
+      surface_ = contact.materials.pair(defaultMaterial, defaultMaterial, config);
+      numbered_ = false;
+    }
+  }
+}
+
+/// Contacts of sleepers leave the list of those that are solved.
+template <Real Scalar, class Layout>
+void SleepStage<Scalar, Layout>::putAside(const Bodies& bodies, Contacts& contact) {
+  const std::vector<StoredImpulse<Scalar>> memory = contact.memory();
+  const auto keyOf = [](const auto& x) { return ContactKeys{x.key1, x.key2}; };
+  for (SleepingIsland<Scalar>& island : islands_) {
+    if (island.state != IslandState::Asleep || island.solved > Scalar(0)) {
+      continue;
+    }
+    island.solved = contact.memoryStep() > Scalar(0) ? contact.memoryStep() : island.span;
+    auto next = memory.begin();
+    for (const Contact<Scalar>& c : island.contacts) {
+      next = std::lower_bound(next, memory.end(), keyOf(c), [&](const auto& stored, const ContactKeys& keys) {
+        return keyOf(stored) < keys;
+      });
+      if (next != memory.end() && keyOf(*next) == keyOf(c)) {
+        island.memory.push_back(*next);
+      }
+    }
+  }
+  contact.dropHeld(bodies);
+}
+
+/// The bodies are awake; what the island kept is appended.
+template <Real Scalar, class Layout>
+void SleepStage<Scalar, Layout>::release(Bodies& bodies, const Contacts& contact,
+                                         const SleepingIsland<Scalar>& island,
+                                         std::vector<Contact<Scalar>>& contacts,
+                                         std::vector<StoredImpulse<Scalar>>& memory) {
+  for (const RestingBody<Scalar>& member : island.members) {
+    if (const auto i = detail::placeOf(bodies, member)) {
+      bodies[*i].setAsleep(false);
+    }
+  }
+  if (!(island.solved > Scalar(0))) {
+    return;  // it was tired only: its contacts are among the others
+  }
+  const auto isThere = [&](std::uint64_t id) { return bodies.find(BodyId{id}).has_value(); };
+  for (const Contact<Scalar>& c : island.contacts) {
+    if (isThere(c.key1) && (c.second == staticPartner || isThere(c.key2))) {
+      contacts.push_back(detail::present(bodies, c));
+    }
+  }
+  const Scalar ratio = contact.memoryStep() / island.solved;
+  for (const StoredImpulse<Scalar>& stored : island.memory) {
+    memory.push_back({stored.key1, stored.key2, detail::times(stored.impulse, ratio)});
+  }
+}
+
+}  // namespace gravel

@@ -1,0 +1,324 @@
+#include "laws/laws.hpp"
+#include "support/catch.hpp"
+#include "support/temporary_file.hpp"
+#include "support/threads.hpp"
+
+// Islands that rest fall asleep, and everything that happens to them wakes them.
+
+using namespace gravel;
+using namespace gravel::test;
+
+namespace {
+
+constexpr double g = 9.81;
+
+SimulationConfig<double> sleepy(double sleepSpeed = 1e-2) {
+  SimulationConfig<double> config = plain(1.0 / 120);
+  config.coeffFriction = config.coeffStaticFriction = 1.0;
+  config.rollingFriction = 0.5;
+  config.coeffRestitution = 0.3;
+  config.sleepSpeed = sleepSpeed;
+  config.sleepTime = 0.25;
+  return config;
+}
+
+std::size_t sleepers(const Space<double>& space) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < space.n(); ++i) {
+    count += space.body(i).isAsleep() ? 1 : 0;
+  }
+  return count;
+}
+
+/// A pyramid of 3 x 3 and 2 x 2 balls and one on top, on a floor, and a single ball far away: bodies 0 to 14.
+Space<double> pyramid(const SimulationConfig<double>& config = sleepy()) {
+  Space<double> space(config);
+  space.setUniformField({0, 0, -g});
+  space.addPlane({0, 0, 1}, 0.0);
+  for (int layer = 0; layer < 3; ++layer) {
+    for (int i = 0; i < 3 - layer; ++i) {
+      for (int j = 0; j < 3 - layer; ++j) {
+        space.addBody(
+            ball({i + layer / 2.0, j + layer / 2.0, 0.5 + layer * std::sqrt(0.5)}, {0, 0, 0}, 0.5, 2.0));
+      }
+    }
+  }
+  space.addBody(ball({20, 0, 0.5}, {0, 0, 0}, 0.5, 2.0));
+  return space;
+}
+
+/// The same, asleep.
+Space<double> asleep(const SimulationConfig<double>& config = sleepy()) {
+  Space<double> space = pyramid(config);
+  advance(space, 40);
+  return space;
+}
+
+}  // namespace
+
+TEST_CASE("What rests for long falls asleep: it stands still, weighs, and the ledger is closed") {
+  Space<double> space = pyramid();
+  const double before = space.energyLedger().total();
+  advance(space, 29);
+  CHECK(sleepers(space) == 0);  // not before the time is over
+  advance(space, 11);
+  CHECK(sleepers(space) == 15);
+  const std::vector<double> state = stateOf(space);
+  advance(space, 100);
+  std::vector<double> later = stateOf(space);
+  later.back() = state.back();  // time
+  CHECK(sameBits(state, later));
+  CHECK(std::get<0>(space.calculateSystemEnergy()) == 0.0);
+  CHECK(space.supportedWeight().residual() < 1e-3);
+  CHECK_THAT(space.planeForce(0)[2], WithinRel(-15 * 2 * g, 1e-3));
+  CHECK(space.contactVirial().residual() < 1e-2);
+  CHECK(space.contacts().empty());
+  CHECK(std::abs(space.energyLedger().total() - before) < 1e-9 * std::abs(before));
+}
+
+TEST_CASE("Nothing sleeps unless asked to, nor while it moves, flies, spins, or stands on what moves") {
+  Space<double> off = pyramid(sleepy(0.0));
+  advance(off, 60);
+  CHECK(sleepers(off) == 0);
+
+  // At the top of a throw so feeble that the ball is slow for all of the time.
+  SimulationConfig<double> config = sleepy();
+  Space<double> thrown(config);
+  thrown.setUniformField({0, 0, -1e-3});
+  thrown.addBody(ball({0, 0, 1}, {0, 0, 0}, 0.5));
+  // Slower than the limit along a wall that carries nothing.
+  thrown.addPlane({1, 0, 0}, 5.0);
+  thrown.addBody(ball({5.5, 0, 1}, {0, 0, 0}, 0.5));
+  advance(thrown, 200);
+  CHECK(sleepers(thrown) == 0);
+
+  Space<double> spinning(config);
+  spinning.setUniformField({0, 0, -g});
+  const std::size_t floor = spinning.addPlane({0, 0, 1}, 0.0);
+  spinning.addBody(ball({0, 0, 0.5}, {0, 0, 0}, 0.5, 1.0, {0, 0, 0.1}));
+  advance(spinning, 60);
+  CHECK(sleepers(spinning) == 0);
+  spinning.body(0).angularVelocity() = Vec(0, 0, 0);
+  spinning.setPlaneVelocity(floor, {1e-3, 0, 0});
+  advance(spinning, 60);
+  CHECK(sleepers(spinning) == 0);
+  spinning.setPlaneVelocity(floor, {0, 0, 0});
+  advance(spinning, 60);
+  CHECK(sleepers(spinning) == 1);
+
+  Space<double> still(config);  // without forces what is slow is at rest; its motion is booked
+  still.addBody(ball({0, 0, 0}, {5e-3, 0, 0}, 0.5));
+  advance(still, 40);
+  CHECK(sleepers(still) == 1);
+  CHECK(still.energyLedger().kinetic == 0.0);
+  CHECK_THAT(still.energyLedger().damping, WithinRel(1.25e-5, 1e-12));
+}
+
+// Each reason alone. Seen to fail: each of the values, the flags, the bodies that are gone and the approach
+// not looked at.
+TEST_CASE("Sleepers wake by whatever happens to them, all that hang together and no others") {
+  Space<double> space = asleep();
+  REQUIRE(sleepers(space) == 15);
+
+  SECTION("somebody gives one of them speed") { space.body(13).velocity() = Vec(0, 0, 1); }
+  SECTION("or spin") { space.body(4).angularVelocity() = Vec(0, 1, 0); }
+  SECTION("or another place") { space.body(13).position()[2] += 1e-9; }
+  SECTION("or mass") { space.body(13).mass() = 3.0; }
+  SECTION("or radius") { space.body(13).radius() = 0.49; }
+  SECTION("or surface") {
+    const MaterialId ice = space.addMaterial({.restitution = 0.1});
+    space.body(13).setMaterial(ice);
+  }
+  SECTION("or makes another body of it") { space.body(13).store(space.body(13).load()); }
+  SECTION("or holds it fast") { space.body(4).setFixed(true); }
+  SECTION("one is taken away") { space.removeBody(BodyId{4}); }
+  SECTION("one is put on top") { space.addBody(ball({1, 1, 2.9}, {0, 0, 0}, 0.5)); }
+  advance(space, 1);
+  CHECK_FALSE(space.body(BodyId{0}).isAsleep());
+  CHECK_FALSE(space.body(BodyId{13}).isAsleep());
+  CHECK(space.body(BodyId{14}).isAsleep());
+}
+
+TEST_CASE("Sleepers wake where the world changes") {
+  Space<double> space = asleep();
+  REQUIRE(sleepers(space) == 15);
+  SECTION("the field") { space.setUniformField({0, 0, -g / 2}); }
+  SECTION("gravity") { space.setG(1e-9); }
+  SECTION("a user's force") {
+    space.setForceHook([](Bodies<double, SoA>&, double) {});
+  }
+  SECTION("a new plane") { space.addPlane({1, 0, 0}, -100.0); }
+  SECTION("a box") { space.addBox({-100, -100, -100}, {100, 100, 100}); }
+  SECTION("the domain") { space.setDomain(Domain<double>::periodic({100, 100, 100})); }
+  SECTION("a plane that is gone") { space.removePlane(0); }
+  SECTION("the surface of all") { space.setCoeffFriction(0.01); }
+  SECTION("a wish") { space.wakeAll(); }
+  advance(space, 1);
+  CHECK(sleepers(space) == 0);
+}
+
+TEST_CASE("Who wakes leans on the others as before") {
+  Space<double> slept = asleep();
+  Space<double> never = asleep(sleepy(0.0));
+  slept.wakeAll();
+  advance(slept, 1);
+  advance(never, 1);
+  CHECK(sleepers(slept) == 0);
+  CHECK(slept.contactCount() == never.contactCount());
+  CHECK(slept.contactReport().iterations <= never.contactReport().iterations + 2);
+  CHECK_THAT(slept.planeForce(0)[2], WithinRel(-15 * 2 * g, 1e-3));
+  CHECK(difference(stateOf(slept), stateOf(never)) < 1e-6);
+}
+
+// Seen to fail: forces and torques not compared.
+TEST_CASE("Sleepers wake when a force on them changes, and only then") {
+  Space<double> space = pyramid();
+  double pull = 0;
+  space.setForceHook([&](Bodies<double, SoA>& bodies, double) {
+    bodies[14].force() += Vec(pull, 0, 0);
+    bodies[13].torque() += Vec(0, 0, pull / 1000);
+  });
+  advance(space, 40);
+  REQUIRE(sleepers(space) == 15);
+  pull = 1e-3;
+  advance(space, 10);
+  CHECK(sleepers(space) == 15);
+  pull = 2 * 1.01 * 1e-2 / 0.25;  // over the mass of 2: a hundredth above sleepSpeed/sleepTime
+  advance(space, 2);
+  CHECK_FALSE(space.body(14).isAsleep());
+  CHECK(space.body(0).isAsleep());
+  pull = 100;  // a torque
+  advance(space, 2);
+  CHECK_FALSE(space.body(0).isAsleep());
+}
+
+TEST_CASE("A passing mass wakes those whom it pulls by as much as counts") {
+  SimulationConfig<double> config = sleepy();
+  config.G = 1;
+  Space<double> space(config);
+  Body<double> planet = ball({0, 0, 0}, {0, 0, 0}, 10, 1000);
+  planet.fixed = true;
+  space.addBody(planet);
+  const BodyId rock = space.addBody(ball({0, 0, 10.1}, {0, 0, 0}, 0.1, 1e-3));
+  advance(space, 60);
+  REQUIRE(space.body(rock).isAsleep());
+  const BodyId visitor = space.addBody(ball({0, 200, 20}, {0, -50, 0}, 0.1, 100));
+  std::size_t i = 0;
+  while (space.body(rock).isAsleep() && i < 1000) {
+    space.computeDynamics(i++);
+  }
+  // 10 at rest; a 64th of that is more than sleepSpeed/sleepTime = 0.04 = 100/r^2.
+  const double r = (space.body(visitor).position() - space.body(rock).position()).norm();
+  CHECK_THAT(r, WithinAbs(50.0, 1.0));
+}
+
+TEST_CASE("Nothing floats when its support moves, sinks or is carried away") {
+  Space<double> space = asleep();
+  const double top = space.body(13).position()[2];
+  SECTION("a floor that sinks") {
+    space.setPlaneVelocity(0, {0, 0, -5});
+    advance(space, 60);
+    CHECK(space.body(13).position()[2] < top - 1);
+  }
+  SECTION("a floor that rises") {
+    space.setPlaneVelocity(0, {0, 0, 1});
+    advance(space, 60);
+    CHECK(space.body(13).position()[2] > top + 0.2);
+  }
+  SECTION("two of the four balls below") {
+    space.body(9).position() = Vec(1, 1, 30);
+    space.body(10).position() = Vec(1, 1, 40);
+    advance(space, 60);
+    CHECK(space.body(13).position()[2] < top - 0.1);
+  }
+}
+
+TEST_CASE("A fixed body that is moved, freed or removed wakes what leans on it") {
+  Space<double> space(sleepy());
+  space.setUniformField({0, 0, -g});
+  Body<double> stand = ball({0, 0, 0}, {0, 0, 0}, 1, 10);
+  stand.fixed = true;
+  const BodyId below = space.addBody(stand);
+  const BodyId rock = space.addBody(ball({0, 0, 1.5}, {0, 0, 0}, 0.5));
+  advance(space, 40);
+  REQUIRE(space.body(rock).isAsleep());
+  SECTION("moved") { space.body(below).position() = Vec(0, 0, -1); }
+  SECTION("freed") { space.body(below).setFixed(false); }
+  SECTION("removed") { space.removeBody(below); }
+  advance(space, 1);
+  CHECK_FALSE(space.body(rock).isAsleep());
+  advance(space, 60);
+  CHECK(space.body(rock).position()[2] < 1.4);
+}
+
+// The pile wakes in the step in which the ball arrives, before the blow: the blow is that of bodies that can
+// move. Seen to fail: those who wake do so a step later (the ball bounces as from a rock).
+TEST_CASE("A ball that hits a heap asleep does what it does to one awake") {
+  const auto hit = [](double sleepSpeed) {
+    Space<double> space = asleep(sleepy(sleepSpeed));
+    CHECK(sleepers(space) == (sleepSpeed > 0 ? 15 : 0));
+    space.addBody(ball({1.1, 1.05, 6}, {0, 0, -15}, 0.5, 4.0));
+    int woke = 0;
+    int blow = 0;
+    const double before = space.energyLedger().total();
+    for (int k = 1; k <= 30; ++k) {
+      space.computeDynamics(0);
+      woke = woke == 0 && !space.body(0).isAsleep() ? k : woke;
+      blow = blow == 0 && !space.impacts().empty() ? k : blow;
+    }
+    CHECK(blow > 20);
+    if (sleepSpeed > 0) {
+      CHECK((woke == blow || woke == blow - 1));
+    }
+    CHECK_THAT(space.energyLedger().total(), WithinAbs(before, 1e-6 * std::abs(before)));
+    return stateOf(space);
+  };
+  const std::vector<double> awake = hit(0.0);
+  const std::vector<double> slept = hit(1e-2);
+  CHECK(difference(awake, slept) < 1e-6);
+}
+
+TEST_CASE("Sleep and waking are the same bits for any number of threads and through a file") {
+  const auto run = [](int threads, int saveAt) {
+    const WithThreads with(threads);
+    const TemporaryFile file("sleep");
+    Space<double> space = pyramid();
+    std::vector<Vec> loads;
+    for (int k = 0; k < 130; ++k) {
+      if (k == 60) {
+        space.addBody(ball({1.1, 1.05, 4}, {0, 0, -5}, 0.5, 4.0));
+      }
+      if (k == saveAt) {
+        space.save(file.path());
+        Space<double> again;
+        again.restore(file.path());
+        space = std::move(again);
+      }
+      space.computeDynamics(0);
+      loads.push_back(space.planeForce(0));
+    }
+    CHECK(sleepers(space) >= 1);  // the one aside at least
+    std::vector<double> state = stateOf(space);
+    for (const Vec& load : loads) {
+      state.insert(state.end(), load.data(), load.data() + 3);
+    }
+    return state;
+  };
+  const std::vector<double> whole = run(1, -1);
+  CHECK(sameBits(whole, run(3, -1)));
+  for (const int saveAt : {20, 30, 31, 50, 60, 61, 90}) {
+    CAPTURE(saveAt);
+    CHECK(sameBits(whole, run(1, saveAt)));
+  }
+}
+
+TEST_CASE("Sleep is refused where nothing rests or touches") {
+  for (const IntegratorKind kind :
+       {IntegratorKind::SymplecticEpicycle, IntegratorKind::GaussRadau15, IntegratorKind::Hermite4}) {
+    SimulationConfig<double> config;
+    config.sleepSpeed = 1e-3;
+    config.integrator = kind;
+    CHECK_THROWS_WITH(config.validate(), ContainsSubstring("sleepSpeed is 0.001; allowed: 0 with") &&
+                                             ContainsSubstring(traitsOf(kind).name));
+  }
+}
