@@ -126,4 +126,32 @@ void Contacts(benchmark::State& state, Use use) {
 BENCHMARK_CAPTURE(Contacts, absent, Use::Absent);
 BENCHMARK_CAPTURE(Contacts, unneeded, Use::Unneeded);
 
+/// Sleep, for a cube of 4096 stacked spheres between walls: off; on, but nobody rests for so long; all sleep.
+/// Beside the time, how wrong the weight on the floor is.
+void Sleep(benchmark::State& state, Use use) {
+  SimulationConfig<double> config = quiet();
+  config.timeStep = 1.0 / 60.0;
+  config.adaptiveTimeStep = false;
+  config.sleepSpeed = use == Use::Absent ? 0.0 : 0.05;
+  config.sleepTime = use == Use::Unneeded ? 1e9 : 0.5;
+  Space<double> space(config);
+  space.addBox({0, 0, 0}, {32, 32, 40}, defaultMaterial, BoxFaces::HighZ);
+  space.setUniformField({0, 0, -9.81});
+  for (std::size_t i = 0; i < 4096; ++i) {
+    Body<double> body;
+    body.position = {1.0 + 2.0 * double(i % 16), 1.0 + 2.0 * double(i / 16 % 16),
+                     1.0 + 2.0 * double(i / 256)};
+    body.radius = 1.0;
+    space.addBody(body);
+  }
+  for (std::size_t i = 0; i < 60; ++i) {
+    space.computeDynamics(i);
+  }
+  run(state, space);
+  state.counters["weight_error"] = space.supportedWeight().residual();
+}
+BENCHMARK_CAPTURE(Sleep, absent, Use::Absent);
+BENCHMARK_CAPTURE(Sleep, unneeded, Use::Unneeded);
+BENCHMARK_CAPTURE(Sleep, needed, Use::Needed);
+
 }  // namespace

@@ -114,6 +114,20 @@ TEST_CASE("Nothing sleeps unless asked to, nor while it moves, flies, spins, or 
   CHECK_THAT(still.energyLedger().damping, WithinRel(1.25e-5, 1e-12));
 }
 
+// Seen to fail: whatever is near wakes those who sleep, without end.
+TEST_CASE("Neighbours that do not touch fall asleep one after the other") {
+  Space<double> space(sleepy());
+  space.setUniformField({0, 0, -g});
+  space.addPlane({0, 0, 1}, 0.0);
+  space.addBody(ball({50, 0, 5}, {0, 0, 0}, 5));  // what is near is so by the largest radius
+  space.addBody(ball({0, 0, 0.5}, {0, 0, 0}, 0.5));
+  advance(space, 15);
+  space.addBody(ball({1.005, 0, 0.5}, {0, 0, 0}, 0.5));
+  CHECK(space.contactCount() == 2);
+  advance(space, 80);
+  CHECK(sleepers(space) == 3);
+}
+
 // Each reason alone. Seen to fail: each of the values, the flags, the bodies that are gone and the approach
 // not looked at.
 TEST_CASE("Sleepers wake by whatever happens to them, all that hang together and no others") {

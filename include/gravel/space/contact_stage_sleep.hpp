@@ -8,7 +8,8 @@
 namespace gravel {
 
 /// On the straight way to the place at h; a path that is bent misses that by |a| h^2/8, less than the margin
-/// of what rests where steps resolve anything.
+/// of what rests where steps resolve anything. What leans on something does not fall, and what is slow comes
+/// near only when it touches: neighbours at rest would else wake each other for ever.
 template <Real Scalar, class Layout>
 template <class Visit>
 void ContactStage<Scalar, Layout>::forEachApproach(const Bodies& bodies, const Config& config,
@@ -17,12 +18,22 @@ void ContactStage<Scalar, Layout>::forEachApproach(const Bodies& bodies, const C
   if (reasonToSkip(bodies) != nullptr) {
     return;
   }
+  std::vector<unsigned char> leans(bodies.size(), 0);
+  for (const Contact<Scalar>& c : contacts_) {
+    leans[c.first] = 1;
+    if (c.second != staticPartner) {
+      leans[c.second] = 1;
+    }
+  }
   const auto way = [&](std::size_t i) -> Vector3<Scalar> {
-    return detail::isMovable(bodies, i)
-               ? Vector3<Scalar>((Vector3<Scalar>(bodies.velocities()[i]) +
-                                  Vector3<Scalar>(bodies.accelerations()[i]) * (h / Scalar(2))) *
-                                 h)
-               : Vector3<Scalar>(Vector3<Scalar>::Zero());
+    Vector3<Scalar> w = Vector3<Scalar>::Zero();
+    if (detail::isMovable(bodies, i)) {
+      w = h * Vector3<Scalar>(bodies.velocities()[i]);
+      if (leans[i] == 0) {
+        w += h * h / Scalar(2) * Vector3<Scalar>(bodies.accelerations()[i]);
+      }
+    }
+    return w;
   };
   search(bodies, config, time, way, profiler);
   for (const Pair& pair : neighbours_.pairs()) {
@@ -38,7 +49,9 @@ void ContactStage<Scalar, Layout>::forEachApproach(const Bodies& bodies, const C
     const Scalar w_sq = w.squaredNorm();
     const Scalar share =
         w_sq > Scalar(0) ? std::clamp<Scalar>(r.dot(w) / w_sq, Scalar(0), Scalar(1)) : Scalar(0);
-    const Scalar reach = Scalar(bodies.radii()[one]) + Scalar(bodies.radii()[held]) + margin_;
+    const bool fast = w_sq >= config.sleepSpeed * config.sleepSpeed * h * h;
+    const Scalar reach =
+        Scalar(bodies.radii()[one]) + Scalar(bodies.radii()[held]) + (fast ? margin_ : Scalar(0));
     if (Vector3<Scalar>(r - share * w).squaredNorm() < reach * reach) {
       visit(held);
     }
