@@ -18,6 +18,7 @@ TEMPLATE_TEST_CASE("A plane's normal is made unit and its offset is measured alo
   CHECK(plane.material == MaterialId{3});
 }
 
+// Seen to fail: normalized() for stableNormalized().
 TEST_CASE("A normal far from the size of 1 is as good as any") {
   for (const double size : {1e-300, 1e-160, 1.0, 1e160, 1e300}) {
     const Plane<double> plane = makePlane<double>({size, -size, 0.0}, 0.0);
@@ -40,6 +41,7 @@ TEST_CASE("Planes without a direction or with numbers that are none are refused,
   CHECK_THROWS_AS(makePlane<float>({0, 0, 0}, 1.0F), std::invalid_argument);
 }
 
+// Seen to fail: the offset of an upper face without its sign.
 TEST_CASE("A box is six planes that look inwards, without the faces that are open") {
   const auto box = makeBox<double>({-1, -2, -3}, {4, 5, 6}, MaterialId{2});
   REQUIRE(box.size() == 6);
@@ -68,6 +70,7 @@ TEST_CASE("A box without an inside, and faces that there are not, are refused") 
                     ContainsSubstring("64") && ContainsSubstring("BoxFaces"));
 }
 
+// Seen to fail: numbers counted from those that are left.
 TEST_CASE("Planes keep their numbers, which are never given twice") {
   Boundaries<double> boundaries;
   const Plane<double> floor = makePlane<double>({0, 0, 1}, 0.0);
@@ -85,6 +88,7 @@ TEST_CASE("Planes keep their numbers, which are never given twice") {
   CHECK(boundaries.at(2).velocity == Vector3<double>::Zero());
 }
 
+// Seen to fail: the whole velocity.
 TEST_CASE("A plane travels by the part of its velocity along its normal") {
   Boundaries<double> boundaries;
   boundaries.add(makePlane<double>({0, 3, 4}, 1.0));
