@@ -1,6 +1,6 @@
 /// Run time against error: every integrator on a Kepler orbit of e = 0.9, the outer solar system, a Plummer
-/// sphere of 1000 bodies, a tight binary among 300 and a bounce under mutual gravity, over a range of steps.
-/// Writes comma-separated values to standard output:
+/// sphere of 1000 bodies, a tight binary among 300, a bounce under mutual gravity and a patch of a ring, over
+/// a range of steps. Writes comma-separated values to standard output:
 ///   problem,integrator,step,seconds,force_calls,energy_error,position_error
 /// `integrators [problem]`; docs/images/integrators.py draws the plots. Processor seconds of one thread: set
 /// OMP_NUM_THREADS=1.
@@ -24,6 +24,7 @@ struct Problem {
   double end = 0.0;  ///< [time]
   double restitution = 1.0;
   std::vector<int> forces;                   ///< force evaluations of a run, about
+  double omega = 0.0;                        ///< not 0: a shear-periodic box of side 10
   std::vector<Vector3<double>> reference{};  ///< places at the end
 };
 
@@ -43,6 +44,9 @@ void run(const Problem& problem, IntegratorKind kind, double step, double factor
   config.timeStep = step > 0.0 ? step : problem.end / 16;
   config.timeStepFactor = factor;
   Space<double> space(config);
+  if (problem.omega != 0.0) {
+    space.setDomain(Domain<double>::shearPeriodic({10, 10, 10}, problem.omega));
+  }
   for (const Body<double>& body : problem.bodies) {
     space.addBody(body);
   }
@@ -62,7 +66,8 @@ void run(const Problem& problem, IntegratorKind kind, double step, double factor
     if (end != nullptr) {
       end->push_back(x);
     } else {
-      place += (x - problem.reference[i]).squaredNorm();
+      place +=
+          space.domain().minimumImage(Vector3<double>(x - problem.reference[i]), space.time()).squaredNorm();
     }
     size += x.squaredNorm();
   }
@@ -75,6 +80,14 @@ void run(const Problem& problem, IntegratorKind kind, double step, double factor
 }
 
 void sweep(Problem problem) {
+  if (problem.omega != 0.0) {
+    const IntegratorKind kind = IntegratorKind::SymplecticEpicycle;
+    run(problem, kind, problem.end / (4 * problem.forces.back()), 0.02, &problem.reference);
+    for (const int steps : problem.forces) {
+      run(problem, kind, problem.end / steps, 0.02);
+    }
+    return;
+  }
   const bool points = !(problem.restitution < 1.0);
   if (points && problem.reference.empty()) {
     run(problem, IntegratorKind::GaussRadau15, 0.0, 0.02, &problem.reference);
@@ -175,5 +188,22 @@ int main(int argc, char** argv) {
            .restitution = 0.5,
            .forces = doublings(256, 1 << 16),
            .reference = {{-4.0 / 7, 0, 0}, {4.0 / 7, 0, 0}}});
+  }
+  if (wanted("ring patch")) {
+    // Points in the flow v_y = -(3/2) Omega x, which pull each other and their images; an orbit.
+    std::vector<Body<double>> bodies(32);
+    const CounterRandom random(5);
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      bodies[i].position = {random.uniform(3 * i, -5, 5), random.uniform(3 * i + 1, -5, 5),
+                            random.uniform(3 * i + 2, -1, 1)};
+      bodies[i].velocity[1] = -1.5 * bodies[i].position[0];
+    }
+    sweep({.name = "ring patch",
+           .bodies = bodies,
+           .G = 0.02,
+           .softening = 0.2,
+           .end = 2 * pi<double>(),
+           .forces = doublings(32, 512),
+           .omega = 1.0});
   }
 }

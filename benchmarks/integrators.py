@@ -19,12 +19,13 @@ TITLES = {
     "plummer": "Plummer sphere, 1000 bodies, 2 time units",
     "binary": "a binary of 41 periods in a cluster of 300, 0.1 time units",
     "bounce": "bounce under mutual gravity",
+    "ring patch": "patch of a ring, 32 bodies and their images, an orbit",
 }
 COLOURS = {
     "VelocityVerlet": "black", "Yoshida4": "tab:blue", "Yoshida6": "tab:orange", "Yoshida8": "tab:olive",
     "BlanesMoan4": "tab:green", "BlanesMoan6": "tab:red", "KahanLi6": "tab:pink", "KahanLi8": "tab:purple",
     "ForceGradient4": "tab:brown", "WisdomHolman": "tab:cyan", "GaussRadau15": "magenta",
-    "Hermite4": "tab:gray",
+    "Hermite4": "tab:gray", "SymplecticEpicycle": "navy",
 }
 
 
