@@ -94,6 +94,63 @@ class UniformGrid {
     }
   }
 
+  std::size_t cells() const { return start_.empty() ? 0 : start_.size() - 1; }
+
+  /// True if two points at this distance are certain to lie in one cell or in neighbouring ones. A 64th of a
+  /// cell is left for the rounding of the points' coordinates in units of cells.
+  bool neighboursReach(const S& distance) const {
+    const S rounding = S(4) * std::numeric_limits<S>::epsilon() *
+                       static_cast<S>(std::max({count_[0], count_[1], count_[2]}));
+    return distance * spare <= cell_ && rounding < (spare - S(1)) / S(2);
+  }
+  static constexpr S spare = S(65) / S(64);
+
+  /// Calls visit(index1, index2) for two points nearer than cell(), one of which lies in a cell of [begin,
+  /// end), and the other in the same cell or in one of the 13 neighbours after it: over all cells each two
+  /// such points once. Safe from several threads at once. O(cells + points met).
+  template <class Visitor>
+  void forEachPair(std::size_t begin, std::size_t end, Visitor&& visit) const {
+    for (std::size_t c = begin; c < end; ++c) {
+      if (start_[c] == start_[c + 1]) {
+        continue;
+      }
+      const std::size_t x = c % count_[0];
+      const std::size_t y = c / count_[0] % count_[1];
+      const std::size_t z = c / count_[0] / count_[1];
+      const std::size_t west = x > 0 ? 1 : 0;
+      const std::size_t east = x + 1 < count_[0] ? 2 : 1;
+      std::size_t from[5];
+      std::size_t to[5];
+      std::size_t rows = 0;
+      const auto add = [&](std::size_t row) {
+        from[rows] = start_[row + x - west];
+        to[rows++] = start_[row + x + east];
+      };
+      for (std::size_t dy = 0; dy < 3 && z + 1 < count_[2]; ++dy) {
+        if (y + dy >= 1 && y + dy <= count_[1]) {
+          add(((z + 1) * count_[1] + y + dy - 1) * count_[0]);
+        }
+      }
+      if (y + 1 < count_[1]) {
+        add((z * count_[1] + y + 1) * count_[0]);
+      }
+      for (std::size_t e = start_[c]; e < start_[c + 1]; ++e) {
+        const auto meet = [&](std::size_t first, std::size_t last) {
+          for (std::size_t other = first; other < last; ++other) {
+            if ((entries_[other].x - entries_[e].x).squaredNorm() < cell_ * cell_) {
+              visit(static_cast<std::size_t>(entries_[e].index),
+                    static_cast<std::size_t>(entries_[other].index));
+            }
+          }
+        };
+        meet(e + 1, start_[c + east]);
+        for (std::size_t r = 0; r < rows; ++r) {
+          meet(from[r], to[r]);
+        }
+      }
+    }
+  }
+
  private:
   struct Entry {
     Vector3<S> x;
@@ -146,12 +203,28 @@ class GridPairs {
       sum += s.radius;
       count += s.radius > S(0) ? 1U : 0U;
     }
-    const S cell = (count == 0 ? S(0) : S(2) * sum / static_cast<S>(count)) + margin;
+    const S cell = ((count == 0 ? S(0) : S(2) * sum / static_cast<S>(count)) + margin) *
+                   (UniformGrid<S>::spare * UniformGrid<S>::spare);
     grid_.build(detail::Homes<S>{&spheres}, cell > S(0) ? cell : S(1));
     return grid_;
   }
   void search(const std::vector<detail::Sphere<S>>& spheres, const S& margin, const Domain<S>& domain,
               const S& time, std::vector<Pair>& out) {
+    const S widest = S(2) * detail::LargestRadii<S>(spheres).largest + margin;
+    if (domain.isOpen() && grid_.cells() > 0 && grid_.neighboursReach(widest)) {
+      // Spheres of nearly one size, as they mostly are: each two looked at once.
+      constexpr std::size_t chunk = 512;
+      parts_.resize((grid_.cells() + chunk - 1) / chunk);
+      parallelForChunks(grid_.cells(), chunk, [&](std::size_t begin, std::size_t end) {
+        std::vector<Pair>& part = parts_[begin / chunk];
+        part.clear();
+        grid_.forEachPair(begin, end, [&](std::size_t i, std::size_t j) {
+          detail::appendIfNear(spheres, i, j, margin, domain, time, part);
+        });
+      });
+      detail::joinPairs(parts_, spheres, out);
+      return;
+    }
     detail::findPairsByQueries(grid_, spheres, margin, domain, time, parts_, out);
   }
 
