@@ -201,6 +201,22 @@ class ContactStage {
   /// not among them. O(contacts).
   std::vector<ContactImpulse<Scalar>> impulses() const { return record_.sum(contacts_, solver_.impulses()); }
 
+  /// Why nothing can touch, or nullptr.
+  const char* reasonToSkip(const Bodies& bodies) const {
+    if (idle_) {
+      return "every body is fixed or asleep";
+    }
+    if (bodies.size() < 2 && boundaries.empty()) {
+      return "one body and no boundary";
+    }
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      if (Scalar(bodies.radii()[i]) > Scalar(0)) {
+        return nullptr;
+      }
+    }
+    return "no body has a radius";
+  }
+
   // Of bodies that sleep: contact_stage_sleep.hpp.
 
   /// Nothing that contacts can move is awake: there is no search.
@@ -277,21 +293,6 @@ class ContactStage {
 
   /// Who was in contact at the step's start, or came to rest in it.
   void rememberResting();
-
-  const char* reasonToSkip(const Bodies& bodies) const {
-    if (idle_) {
-      return "every body is fixed or asleep";
-    }
-    if (bodies.size() < 2 && boundaries.empty()) {
-      return "one body and no boundary";
-    }
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      if (Scalar(bodies.radii()[i]) > Scalar(0)) {
-        return nullptr;
-      }
-    }
-    return "no body has a radius";
-  }
 
   std::vector<HalfSpace<Scalar>> walls_;
   NeighbourList<Scalar> neighbours_;

@@ -32,7 +32,8 @@ struct Space<Scalar, Layout>::Departure {
   Space* space;
   Scalar start;  ///< [s] since the start of the step
   Scalar h;
-  explicit operator bool() const { return true; }
+  bool meets;  ///< anything can touch; if not, kick and drift are one pass
+  explicit operator bool() const { return meets; }
   void operator()(const Scalar& kick) const {
     if (!space->contacts().empty()) {
       space->resolveCollisions();
@@ -108,7 +109,11 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
       kick(late);
     }
   };
-  const Departure departure{this, start, contact_dt_};
+  const char* const alone = contact_.reasonToSkip(bodies_);
+  const Departure departure{this, start, contact_dt_, alone == nullptr || !contacts().empty()};
+  if (!departure) {
+    profiler_.skip(Phase::Impacts, alone);
+  }
   const auto arrival = [&] {
     contact_.boundaries.advance(contact_dt_);
     left_.work -= contact_.wrap(bodies_, Scalar(time_ + end));
