@@ -1,0 +1,100 @@
+/// Steps of a settled pile, and of a Plummer sphere, with one thread and with more, in turns: wall time,
+/// median of the rounds, what a step does outside all parallel regions, and what Amdahl's law makes of it for
+/// 64 threads.
+///
+///   bench_thread_scaling [bodies] [steps to settle] [rounds] [steps a round] [threads]
+///
+/// Figures mean something only on a machine that does nothing else. The share p that runs in parallel follows
+/// from the ratio S of times with T threads, p = (1 - 1/S)/(1 - 1/T), so that it counts as serial what
+/// starting and ending parallel regions takes (Amdahl 1967).
+
+#include "boxes.hpp"
+
+#include <omp.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+
+namespace {
+
+using namespace gravel;
+
+/// Wall time of a call [ms], the median of `rounds`, with one thread and with `threads`.
+std::pair<double, double> times(const std::function<void()>& work, std::size_t rounds, int threads) {
+  std::vector<double> one;
+  std::vector<double> many;
+  for (std::size_t k = 0; k < rounds; ++k) {
+    for (const int count : {1, threads}) {
+      omp_set_num_threads(count);
+      const auto start = std::chrono::steady_clock::now();
+      work();
+      const std::chrono::duration<double, std::milli> passed = std::chrono::steady_clock::now() - start;
+      (count == 1 ? one : many).push_back(passed.count());
+    }
+  }
+  return {boxes::median(one), boxes::median(many)};
+}
+
+void print(const char* scene, std::size_t n, const std::pair<double, double>& ms, std::size_t steps,
+           int threads) {
+  const double ratio = ms.first / ms.second;
+  const double parallel = (1 - 1 / ratio) / (1 - 1.0 / threads);
+  std::printf("%-18s%9zu%12.3f%12.3f%8.2f%10.3f%10.1f\n", scene, n, ms.first / static_cast<double>(steps),
+              ms.second / static_cast<double>(steps), ratio, 1 - parallel,
+              1 / (1 - parallel + parallel / 64));
+}
+
+/// Settled with the tolerances of the comparison with Bullet.
+Space<double> settled(std::size_t n, std::size_t settle) {
+  SimulationConfig<double> config;
+  config.contactTolerance = 1e-2;
+  config.contactIterations = 4;
+  Space<double> space = boxes::spaceOf(boxes::pile(n, 0), config);
+  for (std::size_t k = 0; k < settle; ++k) {
+    space.computeDynamics(k);
+  }
+  return space;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  // Options of other benchmarks, "--...", end the list.
+  const auto argument = [&](int i, std::size_t otherwise) {
+    const bool given = argc > i && argv[i][0] != '-';
+    return given ? std::strtoul(argv[i], nullptr, 10) : otherwise;
+  };
+  const std::size_t n = std::max<std::size_t>(1, argument(1, 1000));
+  const std::size_t settle = argument(2, 20);
+  const std::size_t rounds = std::max<std::size_t>(1, argument(3, 3));
+  const std::size_t steps = std::max<std::size_t>(1, argument(4, 2));
+  const int threads = static_cast<int>(std::max<std::size_t>(2, argument(5, 2)));
+  omp_set_num_threads(threads);
+  std::printf("%-18s%9s%12s%5d%7s%8s%10s%10s\n", "scene", "bodies", "ms, 1", threads, "thr.", "ratio",
+              "serial", "of 64");
+  Space<double> pile = settled(n, settle);
+  std::size_t step = settle;
+  const auto go = [&] {
+    for (std::size_t k = 0; k < steps; ++k) {
+      pile.computeDynamics(step++);
+    }
+  };
+  print("settled pile", n, times(go, rounds, threads), steps, threads);
+  for (const double tolerance : {1e-3, 1e-5}) {
+    SimulationConfig<double> config;
+    config.gravityTolerance = tolerance;
+    config.softening = 1e-3;
+    config.timeStep = 1e-4;
+    config.adaptiveTimeStep = false;
+    Space<double> cluster(config);
+    for (const Body<double>& body : scenes::plummerSphere<double>(n)) {
+      cluster.addBody(body);
+    }
+    std::size_t count = 0;
+    cluster.computeDynamics(count++);  // the first forces
+    const std::string name = tolerance > 1e-4 ? "Plummer 1e-3" : "Plummer 1e-5";
+    print(name.c_str(), n, times([&] { cluster.computeDynamics(count++); }, rounds, threads), 1, threads);
+  }
+}
