@@ -29,8 +29,8 @@ class ContactIslands {
         parent_[std::max(a, b)] = std::min(a, b);
       }
     }
-    for (std::uint32_t i = 0; i < parent_.size(); ++i) {
-      parent_[i] = parent_[parent_[i]];  // parents come before their children
+    for (std::uint32_t& parent : parent_) {
+      parent = parent_[parent];  // parents come before their children
     }
   }
 
