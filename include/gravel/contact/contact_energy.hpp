@@ -43,7 +43,7 @@ class ContactEnergy {
   using Body = detail::SolverBody<S>;
   /// Losses along the normal and across it, work of drift, sum of the contacts' terms that are gains.
   using Sums = Eigen::Array<S, 4, 1>;
-  static constexpr std::size_t chunk = 2048;
+  static constexpr std::size_t chunk = 512;
 
   struct Island {
     S gain = S(0);    ///< of energy

@@ -122,7 +122,7 @@ class ContactProblem {
   Vector3<S> speedIn(const Vector3<S>& v) const { return detail::scaled<S>(v, speedExponent_); }
 
  private:
-  static constexpr std::size_t chunk = 2048;
+  static constexpr std::size_t chunk = 512;
 
   struct Fall {
     Vector3<S> a;  ///< [m s^-2] zero of what nothing moves

@@ -156,7 +156,7 @@ class ContactSolver {
     friend bool operator==(const Name&, const Name&) = default;
   };
 
-  static constexpr std::size_t chunk = 1024;
+  static constexpr std::size_t chunk = 512;
 
   static Name nameOf(const Contact<S>& c) { return {{c.key1, c.key2}, c.first, c.second}; }
 
@@ -184,7 +184,7 @@ class ContactSolver {
     namesBefore_.swap(names_);
     impulses_.resize(contacts.size());
     names_.resize(contacts.size());
-    parallelForChunks(contacts.size(), chunk, [&](std::size_t begin, std::size_t end) {
+    parallelForChunks<Share::Alike>(contacts.size(), chunk, [&](std::size_t begin, std::size_t end) {
       const auto earlier = [](const Name& name, const ContactKeys& keys) { return name.keys < keys; };
       auto old =
           std::lower_bound(namesBefore_.begin(), namesBefore_.end(), nameOf(contacts[begin]).keys, earlier);

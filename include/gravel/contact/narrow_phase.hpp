@@ -79,7 +79,7 @@ class NarrowPhase {
   static S restingMargin() { return S(1) / S(1000); }
 
  private:
-  static constexpr std::size_t chunk = 4096;
+  static constexpr std::size_t chunk = 2048;
 
   /// Where a chunk has got to in the list of those who rest; its own pairs come in the same order.
   struct Cursor {
@@ -94,7 +94,7 @@ class NarrowPhase {
     if (parts_.size() < used_) {
       parts_.resize(used_);
     }
-    parallelForChunks(n, chunk, [&](std::size_t begin, std::size_t end) {
+    parallelForChunks<Share::Alike>(n, chunk, [&](std::size_t begin, std::size_t end) {
       std::vector<Contact<S>>& part = parts_[begin / chunk];
       part.clear();
       Cursor cursor;
@@ -120,7 +120,7 @@ class NarrowPhase {
     }
     const Start last = starts_.back();
     out.resize(last.place + boundaryContacts_.size() - last.wall);
-    parallelForTasks(used_, [&](std::size_t p) {
+    parallelForTasks<Share::Alike>(used_, [&](std::size_t p) {
       const auto wall = boundaryContacts_.begin();
       std::merge(parts_[p].begin(), parts_[p].end(), wall + static_cast<std::ptrdiff_t>(starts_[p].wall),
                  wall + static_cast<std::ptrdiff_t>(starts_[p + 1].wall),

@@ -115,7 +115,7 @@ class PositionalCorrection {
     std::uint32_t slot2;
     bool boundary;
   };
-  static constexpr std::size_t chunk = 1024;
+  static constexpr std::size_t chunk = 512;
 
   /// The largest overlap, and the smallest radius.
   struct Extremes {

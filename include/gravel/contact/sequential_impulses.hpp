@@ -92,7 +92,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
   }
 
  private:
-  static constexpr std::size_t chunk = 2048;
+  static constexpr std::size_t chunk = 512;
   static constexpr int stallSweeps = 32;
 
   /// Step of a body's velocities from sweep to sweep.

@@ -71,10 +71,18 @@ struct Chunks {
 
 }  // namespace detail
 
+/// How chunks find their threads; no result depends on it.
+enum class Share {
+  AsFree,  ///< each to a thread that has nothing to do: where some take much longer than others
+  /// Neighbours to one thread, and the same ones in every pass over as many: where passes follow each other
+  /// over the same memory, which so stays in the caches of one core.
+  Alike
+};
+
 /// Calls f(c) for c = 0 … count-1, shared between threads in any order; a single thread, and no parallel
 /// region at all, when there is just one chunk or one thread. If some calls throw, the exception of the
 /// lowest c among them comes out; which of the later calls were still made is not fixed.
-template <class F>
+template <Share share = Share::AsFree, class F>
 void parallelForTasks(std::size_t count, F&& f) {
   if (count <= 1 || threadCount() == 1) {
     for (std::size_t c = 0; c < count; ++c) {
@@ -85,12 +93,22 @@ void parallelForTasks(std::size_t count, F&& f) {
 #ifdef _OPENMP
   detail::FirstError error;
   const auto last = static_cast<std::ptrdiff_t>(count);
-#pragma omp parallel for schedule(dynamic, 1)
-  for (std::ptrdiff_t c = 0; c < last; ++c) {
+  const auto call = [&](std::ptrdiff_t c) {
     try {
       f(static_cast<std::size_t>(c));
     } catch (...) {
       error.keep(static_cast<std::size_t>(c), std::current_exception());
+    }
+  };
+  if constexpr (share == Share::AsFree) {
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::ptrdiff_t c = 0; c < last; ++c) {
+      call(c);
+    }
+  } else {
+#pragma omp parallel for schedule(static)
+    for (std::ptrdiff_t c = 0; c < last; ++c) {
+      call(c);
     }
   }
   error.rethrow();
@@ -98,17 +116,17 @@ void parallelForTasks(std::size_t count, F&& f) {
 }
 
 /// Calls f(begin, end) for consecutive chunks of [0, n), `chunk` long but for the last.
-template <class F>
+template <Share share = Share::AsFree, class F>
 void parallelForChunks(std::size_t n, std::size_t chunk, F&& f) {
   const detail::Chunks chunks(n, chunk);
-  parallelForTasks(chunks.count(), [&](std::size_t c) { f(chunks.begin(c), chunks.end(c)); });
+  parallelForTasks<share>(chunks.count(), [&](std::size_t c) { f(chunks.begin(c), chunks.end(c)); });
 }
 
-/// Calls f(i) for i = 0 … n-1. `grain` is how many calls are worth a chunk of their own: about a
-/// microsecond's work or more.
+/// Calls f(i) for i = 0 … n-1, all about equally dear, each thread its part of the range. `grain` is how many
+/// calls are worth a chunk of their own: about a microsecond's work or more.
 template <class F>
 void parallelFor(std::size_t n, std::size_t grain, F&& f) {
-  parallelForChunks(n, grain, [&](std::size_t begin, std::size_t end) {
+  parallelForChunks<Share::Alike>(n, grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       f(i);
     }
@@ -127,7 +145,7 @@ T orderedSum(std::size_t n, std::size_t chunk, const T& zero, F&& f) {
     return zero;
   }
   std::vector<T> parts(count, zero);
-  parallelForTasks(count, [&](std::size_t c) { parts[c] = f(chunks.begin(c), chunks.end(c)); });
+  parallelForTasks<Share::Alike>(count, [&](std::size_t c) { parts[c] = f(chunks.begin(c), chunks.end(c)); });
   for (std::size_t width = 1; width < count; width *= 2) {
     for (std::size_t c = 0; c + width < count; c += 2 * width) {
       parts[c] += parts[c + width];

@@ -97,7 +97,7 @@ void kickAndDriftTile(Bodies<Scalar, Layout>& bodies, std::size_t i, std::size_t
 template <Real Scalar, class Layout>
 void kickAndDrift(Bodies<Scalar, Layout>& bodies, const Scalar& kick, const Scalar& drift, bool torques,
                   Compensation<Scalar>* lost) {
-  parallelForChunks(bodies.size(), bodyGrain, [&](std::size_t begin, std::size_t end) {
+  parallelForChunks<Share::Alike>(bodies.size(), bodyGrain, [&](std::size_t begin, std::size_t end) {
     forTilesOrBodies(
         bodies.storage(), begin, end,
         [&](std::size_t i) { kickAndDriftTile(bodies, i, end, kick, drift, torques, lost); },

@@ -39,7 +39,7 @@ class ForceStage {
     } else {
       profiler.skip(Phase::Gravity, reason);
     }
-    parallelForChunks(n, detail::bodyGrain, [&](std::size_t begin, std::size_t end) {
+    parallelForChunks<Share::Alike>(n, detail::bodyGrain, [&](std::size_t begin, std::size_t end) {
       detail::forTilesOrBodies(
           bodies.storage(), begin, end, [&](std::size_t i) { finishTile(bodies, i, reason == nullptr); },
           [&](std::size_t i) { finishOne(bodies, i, reason == nullptr); });

@@ -111,7 +111,7 @@ template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::rememberPlaces() {
   placed_ = n();
   places_.resize(tileCount(n(), static_cast<int>(detail::tileWidth)));
-  parallelForChunks(n(), detail::bodyGrain, [&](std::size_t begin, std::size_t end) {
+  parallelForChunks<Share::Alike>(n(), detail::bodyGrain, [&](std::size_t begin, std::size_t end) {
     detail::forTilesOrBodies(
         bodies_.storage(), begin, end,
         [&](std::size_t i) { places_[i / detail::tileWidth].take(bodies_, i); },
@@ -125,7 +125,7 @@ bool Space<Scalar, Layout>::placesChanged() const {
   if (placed_ != n()) {
     return true;
   }
-  const auto moved = orderedSum(n(), 4096, std::size_t{0}, [&](std::size_t begin, std::size_t end) {
+  const auto moved = orderedSum(n(), 1024, std::size_t{0}, [&](std::size_t begin, std::size_t end) {
     std::size_t count = 0;
     detail::forTilesOrBodies(
         bodies_.storage(), begin, end,

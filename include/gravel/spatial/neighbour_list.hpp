@@ -136,7 +136,7 @@ class NeighbourList {
     }
     const std::size_t n = places_.size();
     parts_.resize((n + chunk - 1) / chunk);
-    parallelForChunks(n, chunk, [&](std::size_t begin, std::size_t end) {
+    parallelForChunks<Share::Alike>(n, chunk, [&](std::size_t begin, std::size_t end) {
       Part part;
       part.swift.swap(parts_[begin / chunk].swift);
       part.swift.clear();
@@ -258,7 +258,7 @@ class NeighbourList {
     return std::min(std::max(S(S(goodLife) * perUpdate), thinnest), thickest);
   }
 
-  static constexpr std::size_t chunk = 8192;
+  static constexpr std::size_t chunk = 1024;
   /// A search costs about as much as this many comparisons of one body with all others.
   static constexpr std::size_t mostComparisons = 128;
   static std::size_t mostSwift(std::size_t n) { return std::min<std::size_t>(8, n / 64); }

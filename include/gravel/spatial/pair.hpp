@@ -49,7 +49,7 @@ void gatherSpheres(const Positions& positions, const Radii& radii, const Ids& id
            "that of positions, " + std::to_string(n));
   }
   out.resize(n);
-  parallelFor(n, 16384, [&](std::size_t i) {
+  parallelFor(n, 1024, [&](std::size_t i) {
     Sphere<S>& s = out[i];
     s.x = positions[i];
     s.radius = radii[i];
@@ -134,7 +134,7 @@ void joinPairs(const std::vector<std::vector<Pair>>& parts, const std::vector<Sp
       out[next[rank[pair.first]]++] = pair;
     }
   }
-  parallelFor(n, 4096, [&](std::size_t k) {
+  parallelFor(n, 1024, [&](std::size_t k) {
     std::sort(out.begin() + static_cast<std::ptrdiff_t>(start[k]),
               out.begin() + static_cast<std::ptrdiff_t>(start[k + 1]),
               [&](const Pair& a, const Pair& b) { return rank[a.second] < rank[b.second]; });
