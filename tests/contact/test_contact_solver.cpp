@@ -46,7 +46,7 @@ Vector3<S> slipOf(const Contact<S>& c, const Bodies<S, SoA>& bodies) {
 }  // namespace
 
 TEMPLATE_TEST_CASE("a column of ten: from nothing, at default settings, each contact carries what lies on it",
-                   "", float, double, long double) {
+                   "", GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
   const S g = static_cast<S>(9.81);
   const S dt = static_cast<S>(1e-3);
@@ -102,8 +102,8 @@ TEST_CASE("a column of ten under gravity comes to rest: no drift, no creep, righ
   }
 }
 
-TEMPLATE_TEST_CASE("a dense crowd: momentum, angular momentum, energy, ledger and cone", "", float, double,
-                   long double) {
+TEMPLATE_TEST_CASE("a dense crowd: momentum, angular momentum, energy, ledger and cone", "",
+                   GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     Bodies<S, SoA> bodies = randomCloud<S>(200, 5.5, seed);
@@ -508,7 +508,8 @@ TEST_CASE("contacts of bodies that do not exist and settings out of range are re
                     ContainsSubstring("restitutionThreshold is -1"));
 }
 
-TEMPLATE_TEST_CASE("every layout, and a user's own arrays, give the same bits", "", SoA, AoS, AoSoA<8>) {
+TEMPLATE_TEST_CASE("every layout, and a user's own arrays, give the same bits", "",
+                   GRAVEL_TEST_TYPES(AoSoA<8>, SoA, AoS)) {
   const Bodies<double, SoA> start = randomCloud<double>(60, 3.0, 4);
   Bodies<double, SoA> reference = start;
   Bodies<double, TestType> bodies;

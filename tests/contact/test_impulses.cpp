@@ -74,8 +74,8 @@ bool near(const Vector3<S>& got, const Vector3<Wide>& expected, Wide scale, Wide
 }  // namespace
 
 TEMPLATE_TEST_CASE(
-    "a blow of any two spheres is the closed form to a few roundings, by context and by solver", "", float,
-    double, long double) {
+    "a blow of any two spheres is the closed form to a few roundings, by context and by solver", "",
+    GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
   const CounterRandom random(11);
   std::uint64_t counter = 0;
@@ -146,8 +146,8 @@ TEMPLATE_TEST_CASE(
   CHECK(sliding > 50);
 }
 
-TEMPLATE_TEST_CASE("a sphere and a half-space: the closed form with an infinite partner", "", float, double,
-                   long double) {
+TEMPLATE_TEST_CASE("a sphere and a half-space: the closed form with an infinite partner", "",
+                   GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
   const CounterRandom random(12);
   std::uint64_t counter = 0;

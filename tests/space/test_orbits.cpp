@@ -174,8 +174,8 @@ TEST_CASE("Adaptive steps of Gauss-Radau are those it asks for, within the limit
   CHECK(space.getPreviousTimeStep() == 50.0);
 }
 
-TEMPLATE_TEST_CASE("Orbits saved and taken up go on bit for bit", "", (std::pair<double, SoA>),
-                   (std::pair<float, AoSoA<8>>)) {
+TEMPLATE_TEST_CASE("Orbits saved and taken up go on bit for bit", "",
+                   GRAVEL_TEST_TYPES((std::pair<double, SoA>), (std::pair<float, AoSoA<8>>))) {
   using S = typename TestType::first_type;
   using Layout = typename TestType::second_type;
   const TemporaryFile file("orbits");
