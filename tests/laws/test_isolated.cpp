@@ -68,11 +68,7 @@ TEST_CASE("Gravity through the space leaves no net force") {
 // and kicks of 2000 steps round at random. Seen to fail: friction's torque with the radius in place of the
 // arm (by 1e-6), and pairs moved apart at the velocity that they had (by 8e-5).
 TEST_CASE("Momentum and angular momentum are kept through gravity, blows, friction and spin") {
-#ifdef GRAVEL_TEST_SLOW
-  const std::size_t steps = 300;
-#else
   const std::size_t steps = 2000;
-#endif
   for (const bool corrected : {false, true}) {
     Space<double> space = cloud(150, 2e-3, 0.5, 0.3, 1.0);
     space.setPositionalCorrectionFactor(corrected ? 0.4 : 0.0);
