@@ -181,10 +181,8 @@ void compare(const char* name, const Scene& scene, std::size_t settle, std::size
 }  // namespace
 
 int main(int argc, char** argv) {
-  // Options of other benchmarks, "--...", end the list: at their default all four are small.
   const auto argument = [&](int i, std::size_t otherwise) {
-    const bool given = argc > i && argv[i][0] != '-';
-    return given ? std::max<std::size_t>(1, std::strtoul(argv[i], nullptr, 10)) : otherwise;
+    return boxes::argument(argc, argv, i, otherwise, 1);
   };
   omp_set_num_threads(1);
   const std::size_t n = argument(1, 1000);

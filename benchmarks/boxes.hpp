@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <memory>
 #include <vector>
 
@@ -136,6 +137,12 @@ inline Errors errorsOf(const gravel::Space<double>& space) {
 inline double median(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   return values[values.size() / 2];
+}
+
+/// The number given as argument i. Options of other benchmarks, "--...", end the list.
+inline std::size_t argument(int argc, char** argv, int i, std::size_t otherwise, std::size_t least = 1) {
+  const bool given = argc > i && argv[i][0] != '-';
+  return given ? std::max<std::size_t>(least, std::strtoul(argv[i], nullptr, 10)) : otherwise;
 }
 
 }  // namespace boxes

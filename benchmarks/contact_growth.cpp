@@ -169,10 +169,8 @@ void run(const char* name, const Scene& scene, std::size_t settle, std::size_t s
 }  // namespace
 
 int main(int argc, char** argv) {
-  // Options of other benchmarks, "--...", end the list.
   const auto argument = [&](int i, std::size_t otherwise) {
-    const bool given = argc > i && argv[i][0] != '-';
-    return given ? std::strtoul(argv[i], nullptr, 10) : otherwise;
+    return boxes::argument(argc, argv, i, otherwise, 0);
   };
   omp_set_num_threads(1);
   const std::size_t fewest = std::max<std::size_t>(1, argument(1, 1000));

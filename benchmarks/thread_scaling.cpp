@@ -61,10 +61,8 @@ Space<double> settled(std::size_t n, std::size_t settle) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  // Options of other benchmarks, "--...", end the list.
   const auto argument = [&](int i, std::size_t otherwise) {
-    const bool given = argc > i && argv[i][0] != '-';
-    return given ? std::strtoul(argv[i], nullptr, 10) : otherwise;
+    return boxes::argument(argc, argv, i, otherwise, 0);
   };
   const std::size_t n = std::max<std::size_t>(1, argument(1, 1000));
   const std::size_t settle = argument(2, 20);
