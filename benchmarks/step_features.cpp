@@ -154,4 +154,39 @@ BENCHMARK_CAPTURE(Sleep, absent, Use::Absent);
 BENCHMARK_CAPTURE(Sleep, unneeded, Use::Unneeded);
 BENCHMARK_CAPTURE(Sleep, needed, Use::Needed);
 
+/// Light bodies on circles about a heavy one, points, 1000 steps of velocity Verlet at a time: by one
+/// advanceTo, or one by one, each with the look at what a user may have changed. Beside the time of a step,
+/// the change of the energy over all steps.
+void FewPoints(benchmark::State& state, bool oneByOne) {
+  SimulationConfig<double> config;
+  config.G = 1.0;
+  config.timeStep = 1.0 / 1024;
+  config.adaptiveTimeStep = false;
+  Space<double> space(config);
+  for (std::int64_t i = 0; i < state.range(0); ++i) {
+    const double r = i == 0 ? 0.0 : 1.0 + 0.3 * static_cast<double>(i);
+    const Vector3<double> out(std::cos(double(i)), std::sin(double(i)), 0.0);
+    Body<double> body;
+    body.position = r * out;
+    body.velocity = i == 0 ? Vector3<double>(0, 0, 0) : Vector3<double>(-out[1], out[0], 0) / std::sqrt(r);
+    body.mass = i == 0 ? 1.0 : 1e-6;
+    space.addBody(body);
+  }
+  const double energy = space.energyLedger().total();
+  const Stopwatch watch;
+  for (auto _ : state) {
+    if (oneByOne) {
+      for (std::size_t i = 0; i < 1000; ++i) {
+        space.computeDynamics(i);
+      }
+    } else {
+      space.advanceTo(space.time() + 1000 * config.timeStep);
+    }
+  }
+  state.counters["ns_per_step"] = watch.nanoseconds() / static_cast<double>(space.steps());
+  state.counters["energy_error"] = std::abs(space.energyLedger().total() / energy - 1.0);
+}
+BENCHMARK_CAPTURE(FewPoints, advanceTo, false)->Arg(2)->Arg(3)->Arg(6)->Arg(10);
+BENCHMARK_CAPTURE(FewPoints, computeDynamics, true)->Arg(2)->Arg(3)->Arg(6)->Arg(10);
+
 }  // namespace

@@ -144,6 +144,9 @@ T orderedSum(std::size_t n, std::size_t chunk, const T& zero, F&& f) {
   if (count == 0) {
     return zero;
   }
+  if (count == 1) {
+    return f(0, n);
+  }
   std::vector<T> parts(count, zero);
   parallelForTasks<Share::Alike>(count, [&](std::size_t c) { parts[c] = f(chunks.begin(c), chunks.end(c)); });
   for (std::size_t width = 1; width < count; width *= 2) {

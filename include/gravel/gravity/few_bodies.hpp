@@ -5,13 +5,11 @@
 
 #include <gravel/gravity/pair_law.hpp>
 
-#include <algorithm>
-#include <array>
-
 namespace gravel::detail {
 
-/// Sums over at most `most` bodies, pair by pair, in their own units; the square roots and divisions of all
-/// pairs stand together, so that packets do them.
+/// Sums over at most `most` bodies, each pair once, in their own units: a body with two others at a time.
+/// What was written as a packet is read as one, or number by number, never the other way: a packet of numbers
+/// just written one by one has to wait for them.
 template <class S>
 struct FewBodies {
   static constexpr std::size_t most = 14;
@@ -26,63 +24,82 @@ struct FewBodies {
     if (n > most || masses.size() != n || !(std::abs(G) <= S(1e100)) || !(softening >= S(0))) {
       return false;
     }
-    constexpr std::size_t pairs = most * (most - 1) / 2;
-    alignas(32) std::array<S, pairs> dx, dy, dz, s, w;
-    std::array<S, most> x, y, z, m;
-    for (std::size_t i = 0; i < n; ++i) {
-      const Vector3<S> p = positions[i];
-      x[i] = p[0];
-      y[i] = p[1];
-      z[i] = p[2];
-      m[i] = masses[i];
-      if (!(m[i] >= S(0)) || !(m[i] <= S(1e100))) {
+    Column x, y, z, m, ax, ay, az;  // at first the pull of those before
+    for (std::size_t i = 0; i < n; i += 2) {
+      const bool pair = i + 1 < n;  // else the last body stands there again, without a mass
+      const std::size_t k = pair ? i + 1 : i;
+      const Vector3<S> one = positions[i];
+      const Vector3<S> two = positions[k];
+      const S m_one = masses[i];
+      const S m_two = masses[k];
+      if (!(m_one >= S(0)) || !(m_one <= S(1e100)) || !(m_two >= S(0)) || !(m_two <= S(1e100))) {
         return false;
       }
+      x.put(i, Pack(one[0], two[0]));
+      y.put(i, Pack(one[1], two[1]));
+      z.put(i, Pack(one[2], two[2]));
+      m.put(i, Pack(m_one, pair ? m_two : S(0)));
+      ax.put(i, Pack::Zero());
+      ay.put(i, Pack::Zero());
+      az.put(i, Pack::Zero());
     }
-    const S softening_sq = softening * softening;
-    S least(1);
-    S sum(0);  // what is not finite stays in it
-    std::size_t p = 0;
+    // What is no pair adds nothing, and shall not look like one of points that coincide.
+    const S e = softening * softening;
+    const Pack ofOthers = Pack::Constant(e);
+    const Pack ofItself(e + S(1), e);
+    const Pack ofLast(e, n % 2 == 0 ? e : S(e + S(1)));
+    Pack least = Pack::Constant(S(1));
+    Pack total = Pack::Zero();  // what is not finite stays in it
+    S behind[most][3];          // the pull of those behind
     for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = i + 1; j < n; ++j, ++p) {
-        dx[p] = x[j] - x[i];
-        dy[p] = y[j] - y[i];
-        dz[p] = z[j] - z[i];
-        s[p] = dx[p] * dx[p] + dy[p] * dy[p] + dz[p] * dz[p] + softening_sq;
-        least = std::min(least, s[p]);
-        sum += s[p];
+      const Pack x_i = Pack::Constant(x.at[i]);
+      const Pack y_i = Pack::Constant(y.at[i]);
+      const Pack z_i = Pack::Constant(z.at[i]);
+      const Pack m_i = Pack::Constant(m.at[i]);
+      Pack sx = Pack::Zero();
+      Pack sy = Pack::Zero();
+      Pack sz = Pack::Zero();
+      for (std::size_t k = (i + 1) / 2 * 2; k < n && i + 1 < n; k += 2) {
+        const Pack dx = x.pack(k) - x_i;
+        const Pack dy = y.pack(k) - y_i;
+        const Pack dz = z.pack(k) - z_i;
+        const Pack s = dx * dx + dy * dy + dz * dz + (k == i ? ofItself : k + 2 < n ? ofOthers : ofLast);
+        least = least.min(s);
+        total += s;
+        const Pack w = PairLaw<S>::accelerationFactor(s);
+        const Pack f_i = m.pack(k) * w;
+        const Pack f_k = m_i * w;
+        sx += f_i * dx;
+        sy += f_i * dy;
+        sz += f_i * dz;
+        ax.put(k, ax.pack(k) - f_k * dx);
+        ay.put(k, ay.pack(k) - f_k * dy);
+        az.put(k, az.pack(k) - f_k * dz);
       }
+      behind[i][0] = sx[0] + sx[1];
+      behind[i][1] = sy[0] + sy[1];
+      behind[i][2] = sz[0] + sz[1];
     }
-    if (!(least >= S(1e-100)) || !(sum <= S(1e100))) {
+    if (!(least.minCoeff() >= S(1e-100)) || !(total.sum() <= S(1e100))) {
       return false;
     }
-    constexpr std::size_t width = 4;
-    std::size_t q = 0;
-    for (; q + width <= p; q += width) {
-      using T = Lanes<S, static_cast<int>(width)>;
-      const T tile = Eigen::Map<const T>(&s[q]);
-      Eigen::Map<T>{&w[q]} = PairLaw<S>::accelerationFactor(tile);
-    }
-    for (; q < p; ++q) {
-      w[q] = PairLaw<S>::accelerationFactor(s[q]);
-    }
-    std::array<S, most> ax{}, ay{}, az{};
-    p = 0;
     for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = i + 1; j < n; ++j, ++p) {
-        const S f_i = m[j] * w[p];
-        const S f_j = m[i] * w[p];
-        ax[i] += f_i * dx[p];
-        ay[i] += f_i * dy[p];
-        az[i] += f_i * dz[p];
-        ax[j] -= f_j * dx[p];
-        ay[j] -= f_j * dy[p];
-        az[j] -= f_j * dz[p];
-      }
-      out[i] = Vector3<S>(ax[i] * G, ay[i] * G, az[i] * G);
+      out[i] = Vector3<S>((behind[i][0] + ax.at[i]) * G, (behind[i][1] + ay.at[i]) * G,
+                          (behind[i][2] + az.at[i]) * G);
     }
     return true;
   }
+
+ private:
+  using Pack = Lanes<S, 2>;
+
+  /// A number of each body.
+  struct Column {
+    alignas(16) S at[most];
+    Pack pack(std::size_t i) const { return Eigen::Map<const Pack>(at + i); }
+    void put(std::size_t i, const Pack& p) { Eigen::Map<Pack>{at + i} = p; }
+  };
+  static_assert(most % 2 == 0);
 };
 
 }  // namespace gravel::detail

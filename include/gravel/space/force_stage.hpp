@@ -26,6 +26,22 @@ class ForceStage {
 
   bool hasTorques() const { return static_cast<bool>(hook); }
 
+  /// Why no body pulls another, or nullptr.
+  const char* reasonToSkip(const Bodies<Scalar, Layout>& bodies, const Scalar& G) const {
+    if (G == Scalar(0)) {
+      return "G is 0";
+    }
+    if (bodies.size() < 2) {
+      return "fewer than two bodies";
+    }
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      if (Scalar(bodies[i].mass()) > Scalar(0)) {
+        return nullptr;
+      }
+    }
+    return "no body has mass";
+  }
+
   /// Sets force, torque, acceleration and angular acceleration of every body at the present positions.
   void evaluate(Bodies<Scalar, Layout>& bodies, const Scalar& G, const Scalar& softening,
                 const Domain<Scalar>& domain, const Scalar& time, Profiler& profiler) {
@@ -116,21 +132,6 @@ class ForceStage {
         detail::tileOf(storage, fields::Force{}, c, i) = a * m;
       }
     }
-  }
-
-  const char* reasonToSkip(const Bodies<Scalar, Layout>& bodies, const Scalar& G) const {
-    if (G == Scalar(0)) {
-      return "G is 0";
-    }
-    if (bodies.size() < 2) {
-      return "fewer than two bodies";
-    }
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      if (Scalar(bodies[i].mass()) > Scalar(0)) {
-        return nullptr;
-      }
-    }
-    return "no body has mass";
   }
 
   void addHook(Bodies<Scalar, Layout>& bodies, const Scalar& time) {

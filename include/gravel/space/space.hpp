@@ -219,7 +219,11 @@ class Space : public Settings<Scalar> {
   void updateAdaptiveTimeStep();
   void applyDamping();
 
-  void step(Scalar h, std::size_t iteration);
+  void step(Scalar h, std::size_t iteration, const Scalar* until = nullptr);
+  static bool isWholeStepLeft(const Scalar& rest, const Scalar& h);
+  std::pair<Scalar, Scalar> timeAfter(const Scalar& h) const;
+  bool areFewPoints() const;
+  std::size_t moveFewPoints(const Scalar& h, const Scalar* until, Profiler::Step& timing);
   std::size_t chooseParts(const Scalar& h) const;
   void advance(const Scalar& h, std::size_t part, std::size_t parts);
   void prepare();

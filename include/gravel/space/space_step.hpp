@@ -19,6 +19,7 @@
 /// end of the step lets piles sink by g h^2/2 and be lifted again every step, which spins a rolling pile up.
 
 #include <gravel/space/space.hpp>
+#include <gravel/space/space_points.hpp>
 #include <gravel/space/space_substeps.hpp>
 
 namespace gravel {
@@ -38,8 +39,7 @@ void Space<Scalar, Layout>::advanceTo(Scalar time) {
   while (time_ < time) {
     prepare();
     const Scalar rest = time - time_;
-    // A rest of a millionth of a step is joined to the step: it is rounding in the sum of steps.
-    if (rest <= dt_ * Scalar(1.000001)) {
+    if (!isWholeStepLeft(rest, dt_)) {
       const Scalar next = dt_;
       step(rest, steps_);
       if (!this->config_.adaptiveTimeStep) {
@@ -48,21 +48,44 @@ void Space<Scalar, Layout>::advanceTo(Scalar time) {
       time_ = time;
       timeRest_ = Scalar(0);
     } else {
-      step(dt_, steps_);
+      const bool alike = !this->config_.adaptiveTimeStep && !this->config_.diagnosticsEnabled;
+      step(dt_, steps_, alike ? &time : nullptr);
     }
   }
 }
 
+/// Whether the rest of a run is longer than a step of length h. A rest of a millionth of a step is joined to
+/// the step: it is rounding in the sum of steps.
 template <Real Scalar, class Layout>
-void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration) {
-  const Profiler::Step timing(profiler_);
+bool Space<Scalar, Layout>::isWholeStepLeft(const Scalar& rest, const Scalar& h) {
+  return !(rest <= h * Scalar(1.000001));
+}
+
+/// The time when h more has passed, and what is lost to rounding then.
+template <Real Scalar, class Layout>
+std::pair<Scalar, Scalar> Space<Scalar, Layout>::timeAfter(const Scalar& h) const {
+  const Scalar more = h + timeRest_;
+  const Scalar sum = time_ + more;
+  return {sum, more - (sum - time_)};
+}
+
+/// One step of length h. \param until  [s] if given, the space may go on with steps that are all alike while
+///   whole ones are left before that time
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration, const Scalar* until) {
+  Profiler::Step timing(profiler_);
+  std::size_t more = 0;
   if (!bodies_.empty()) {
     ledgerOpen_ = true;
     previous_dt_ = h;
     contact_.beginStep();
     parts_ = chooseParts(h);
-    for (std::size_t part = 0; part < parts_; ++part) {
-      advance(h, part, parts_);
+    if (areFewPoints()) {
+      more = moveFewPoints(h, until, timing);
+    } else {
+      for (std::size_t part = 0; part < parts_; ++part) {
+        advance(h, part, parts_);
+      }
     }
     left_.restitution += contact_.report().restitutionLoss;
     left_.friction += contact_.report().frictionLoss;
@@ -78,13 +101,12 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration) {
     previous_dt_ = h;
     profiler_.skip(Phase::Integration, "no bodies");
   }
-  const Scalar sum = time_ + (h + timeRest_);
-  timeRest_ = (h + timeRest_) - (sum - time_);
-  time_ = sum;
+  std::tie(time_, timeRest_) = timeAfter(h);
   ++steps_;
   stepGoesOn_ = contactCount() == 0;
   updateAdaptiveTimeStep();
   logSystemEnergy(iteration);
+  profiler_.repeatSkips(more);
 }
 
 /// Checks all bodies; then forces, contacts and the step of the present places, if a body, its place or its
