@@ -34,10 +34,10 @@ struct Errors {
   double worst;  ///< the 99.99th percentile of a few thousand bodies is their worst
 };
 
-/// Relative errors of every stride-th body; of small accelerations, relative to a hundredth of the mean.
+/// Relative errors of every stride-th body; of small accelerations, relative to a share of the mean.
 template <class S>
 Errors errors(const PointMasses<S>& points, const std::vector<Vector3<S>>& a, long double softening = 0,
-              std::size_t stride = 1) {
+              std::size_t stride = 1, long double least = 0.01L) {
   long double mean = 0;
   for (const Vector3<S>& x : a) {
     mean += static_cast<long double>(x.norm()) / static_cast<long double>(a.size());
@@ -55,8 +55,8 @@ Errors errors(const PointMasses<S>& points, const std::vector<Vector3<S>>& a, lo
         exact += static_cast<long double>(points.masses[j]) / (s * std::sqrt(s)) * d;
       }
     }
-    const long double error =
-        (a[i].template cast<long double>() - exact).norm() / std::max<long double>(exact.norm(), mean / 100);
+    const long double error = (a[i].template cast<long double>() - exact).norm() /
+                              std::max<long double>(exact.norm(), mean * least);
     squares += error * error;
     worst = std::max(worst, error);
   }
@@ -79,6 +79,24 @@ TEST_CASE("the error is within the tolerance in every scene, rms and worst body"
       CHECK(e.rms > 0);
       CHECK(imbalance(points, a) <= 1e-14);
     }
+  }
+}
+
+// These were 10.7, 15.3 and 11.6 tolerances before bodies at the rims of cells were looked at one by one.
+TEST_CASE("where few bodies have most of the mass the worst one errs by ten tolerances at most") {
+  struct Case {
+    std::size_t n;
+    std::uint64_t seed;
+    double tolerance;
+  };
+  for (const Case& c : {Case{1000, 249, 1e-3}, Case{2000, 429, 6e-3}, Case{2000, 417, 3e-4}}) {
+    const auto points = gravityScene<double>("nine decades of mass", c.n, c.seed);
+    const auto a = accelerations(points, c.tolerance);
+    const Errors e = errors(points, a, 0, 1, 0.1L);
+    CAPTURE(c.n, c.seed, c.tolerance, e.worst);
+    CHECK(e.worst <= 10 * c.tolerance);
+    CHECK(e.worst > c.tolerance);
+    CHECK(imbalance(points, a) <= 1e-14);
   }
 }
 

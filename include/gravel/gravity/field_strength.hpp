@@ -5,6 +5,7 @@
 
 #include <gravel/gravity/body_tree.hpp>
 #include <gravel/gravity/image_field.hpp>
+#include <gravel/gravity/rim_strength.hpp>
 
 namespace gravel::detail {
 
@@ -12,13 +13,18 @@ namespace gravel::detail {
 /// groups of at most 64 bodies, of large systems 256, feel at their centre from other cells, and images of
 /// cells, as points. An error of that size at all of them has a relative rms of `share`. Accelerations below
 /// a thousandth of the mean count as that much; in a periodic system, where they may cancel everywhere, the
-/// mean counts as at least a tenth of the pull of one body at the mean distance. Needs the geometry of
-/// TreeMoments. About 100 pairs of cells a group.
+/// mean counts as at least a tenth of the pull of one body at the mean distance.
+///
+/// Then lowered for the sake of bodies at a rim in groups whose masses are uneven, so that none errs by more
+/// than 1.3 share of its own acceleration, or of a tenth of the mean: see RimStrength.
+///
+/// Needs the geometry of TreeMoments. About 100 pairs of cells a group.
 template <Real S, Real F>
 class FieldStrength {
  public:
+  /// \param order of the expansions
   /// \param field of the far images, which have been gathered unless `images` is open
-  void compute(BodyTree<S, F>& tree, const F& share, const PeriodicImages<S, F>& images,
+  void compute(BodyTree<S, F>& tree, const F& share, int order, const PeriodicImages<S, F>& images,
                const ImageField<S, F>& field) {
     const std::size_t n = tree.cells.size();
     groupSize_ = static_cast<std::uint32_t>(std::clamp<std::size_t>(tree.size() / 256, 64, 256));
@@ -35,18 +41,32 @@ class FieldStrength {
       }
     }
     strength_.resize(groups_.size());
+    isUneven_.resize(groups_.size());
+    parallelFor(groups_.size(), 64,
+                [&](std::size_t g) { isUneven_[g] = Rims::isUneven(tree, tree.cells[groups_[g]]) ? 1 : 0; });
+    const bool hasRims = std::find(isUneven_.begin(), isUneven_.end(), 1) != isUneven_.end();
+    if (hasRims) {
+      rims_.begin(tree, order);
+    }
     parallelForChunks(groups_.size(), 64, [&](std::size_t begin, std::size_t end) {
-      std::vector<std::uint32_t> todo;
+      std::vector<ImageCell> todo;
       for (std::size_t g = begin; g < end; ++g) {
         const TreeCell<F>& group = tree.cells[groups_[g]];
         Vector3<F> a = Vector3<F>::Zero();
-        for (const Vector3<S>& shift : images.shifts()) {
-          addField(tree, group, Vector3<F>(F(shift[0]), F(shift[1]), F(shift[2])), todo, a);
+        GroupField<F> around;
+        for (std::uint32_t image = 0; image < images.shifts().size(); ++image) {
+          const Vector3<S>& shift = images.shifts()[image];
+          addField(tree, group, Vector3<F>(F(shift[0]), F(shift[1]), F(shift[2])), image, todo, a,
+                   isUneven_[g] != 0 ? &around : nullptr);
         }
         if (!images.isOpen()) {
+          around.far += field.at(group.centre);
           a += field.at(group.centre);
         }
         strength_[g] = F(a.norm());
+        if (isUneven_[g] != 0) {
+          rims_.look(tree, groups_[g], around, images.shifts(), todo);
+        }
       }
     });
     F mean(0);
@@ -58,6 +78,9 @@ class FieldStrength {
       mean = std::max<F>(mean, F(0.1) * pullAtMeanDistance(tree));
     }
     shareOut(tree, share, F(mean * F(1e-3)));
+    if (hasRims) {
+      rims_.spare(tree, F(F(1.3) * share), F(F(0.1) * mean));
+    }
   }
 
  private:
@@ -69,28 +92,36 @@ class FieldStrength {
     return r > F(0) ? F(root.mass / (r * r) * F(std::cbrt(1 / n))) : F(0);
   }
 
-  /// Adds to `sum` what an image of all cells does to a group.
+  using Rims = RimStrength<S, F>;
+
+  /// Adds to `sum` what an image of all cells does to a group, and to `around`, if any, what rims need.
   void addField(const BodyTree<S, F>& tree, const TreeCell<F>& group, const Vector3<F>& shift,
-                std::vector<std::uint32_t>& todo, Vector3<F>& sum) const {
+                std::uint32_t image, std::vector<ImageCell>& todo, Vector3<F>& sum,
+                GroupField<F>* around) const {
     using std::sqrt;
-    todo.assign(1, 0);
+    const F near = F(group.radius) * F(group.radius);
+    todo.assign(1, {0, image});
     while (!todo.empty()) {
-      const TreeCell<F>& source = tree.cells[todo.back()];
+      const ImageCell from = todo.back();
+      const TreeCell<F>& source = tree.cells[from.cell];
       todo.pop_back();
       const Vector3<F> d = (source.centre - group.centre) + shift;
       const F r_sq = d.squaredNorm();
       const F own = F(source.radius) * F(source.radius);
       const bool isFar = r_sq > F(1.5) * own;
-      if (isFar || source.isLeaf() || source.count() <= groupSize_) {
-        const F near = F(group.radius) * F(group.radius);
-        const F s = r_sq + (isFar && r_sq > near ? F(0) : F(own + near));
-        if (s > F(0)) {
-          sum += (source.mass / (s * sqrt(s))) * d;
+      if (!isFar && !source.isLeaf() && source.count() > groupSize_) {
+        for (std::uint32_t child = source.child; child < source.child + source.children; ++child) {
+          todo.push_back({child, image});
         }
-      } else {
-        for (std::uint32_t child = 0; child < source.children; ++child) {
-          todo.push_back(source.child + child);
-        }
+        continue;
+      }
+      const F s = r_sq + (isFar && r_sq > near ? F(0) : F(own + near));
+      const F w = s > F(0) ? F(source.mass / (s * sqrt(s))) : F(0);
+      sum += w * d;
+      if (around != nullptr && isFar && r_sq > F(4) * near) {
+        around->addFar(d, w, F(w / s));
+      } else if (around != nullptr) {
+        around->near.push_back(from);
       }
     }
   }
@@ -132,7 +163,9 @@ class FieldStrength {
   std::uint32_t groupSize_ = 64;
   std::vector<std::uint32_t> groups_;
   std::vector<std::uint8_t> isBelow_;
-  std::vector<F> strength_;
+  std::vector<std::uint8_t> isUneven_;  ///< of each group
+  std::vector<F> strength_;             ///< of each group
+  Rims rims_;
 };
 
 }  // namespace gravel::detail
