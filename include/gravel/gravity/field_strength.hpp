@@ -50,10 +50,11 @@ class FieldStrength {
     }
     parallelForChunks(groups_.size(), 64, [&](std::size_t begin, std::size_t end) {
       std::vector<ImageCell> todo;
+      GroupField<F> around;
       for (std::size_t g = begin; g < end; ++g) {
         const TreeCell<F>& group = tree.cells[groups_[g]];
         Vector3<F> a = Vector3<F>::Zero();
-        GroupField<F> around;
+        around.clear();
         for (std::uint32_t image = 0; image < images.shifts().size(); ++image) {
           const Vector3<S>& shift = images.shifts()[image];
           addField(tree, group, Vector3<F>(F(shift[0]), F(shift[1]), F(shift[2])), image, todo, a,

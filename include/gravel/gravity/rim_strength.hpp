@@ -14,6 +14,12 @@ struct GroupField {
   Eigen::Matrix<F, 3, 3> tide = Eigen::Matrix<F, 3, 3>::Zero();  ///< derivatives of that
   std::vector<ImageCell> near;                                   ///< the group itself among them
 
+  void clear() {
+    far.setZero();
+    tide.setZero();
+    near.clear();
+  }
+
   /// \param d from the centre to a mass m at the distance r. \param w m / r^3. \param v m / r^5
   void addFar(const Vector3<F>& d, const F& w, const F& v) {
     far += w * d;
