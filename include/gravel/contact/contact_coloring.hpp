@@ -158,15 +158,15 @@ class ContactColoring {
 
 namespace detail {
 
-/// Sum of f(k) over rows [begin, end) that share no movable body, shared between threads where they are many;
-/// chunks depend on their number alone.
+/// Calls f(k, sum), which adds to the sum, for rows [begin, end) that share no movable body, shared between
+/// threads where they are many; chunks depend on their number alone.
 template <class T, class F>
 T sumOverRows(std::size_t begin, std::size_t end, const T& zero, F&& f) {
   constexpr std::size_t chunk = 256;
   const auto run = [&](std::size_t from, std::size_t to) {
     T sum = zero;
     for (std::size_t k = from; k < to; ++k) {
-      sum += f(k);
+      f(k, sum);
     }
     return sum;
   };
@@ -186,7 +186,7 @@ T sumOverColours(const ContactColoring& colouring, const T& zero, F&& f) {
   }
   const std::size_t overflow = colouring.colours();
   for (std::size_t k = colouring.begin(overflow); k < colouring.end(overflow); ++k) {
-    sum += f(k);
+    f(k, sum);
   }
   return sum;
 }

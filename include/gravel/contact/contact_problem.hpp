@@ -49,7 +49,7 @@ class ContactProblem {
     rows.resize(contacts.size());
     turning.resize(kinds.turn ? contacts.size() : 0);
     slipTargets.assign(friction && (kinds.drift || kinds.spring) ? rows.size() : 0, Vector3<S>::Zero());
-    const auto take = [&](std::size_t k) {
+    const auto take = [&](std::size_t k, Largest& most) {
       const ContactColoring::Row& place = colouring.rows()[k];
       const Contact<S>& contact = contacts[place.contact];
       if (k + lookAhead < contacts.size()) {
@@ -66,17 +66,16 @@ class ContactProblem {
       }
       const ContactImpulse<S>& before = last[place.contact];
       aim(k, contact, dt, settings, before.normal > S(0));
-      return Largest{rows[k].target -
-                     detail::normalVelocity(rows[k], initial[place.slot1], initial[place.slot2])};
+      most += Largest{rows[k].target -
+                      detail::normalVelocity(rows[k], initial[place.slot1], initial[place.slot2])};
     };
     Largest most = detail::sumOverRows(0, colouring.loneCount(), Largest{}, take);
-    most += detail::sumOverColours(colouring, Largest{}, [&](std::size_t k) {
-      const Largest excess = take(k);
+    most += detail::sumOverColours(colouring, Largest{}, [&](std::size_t k, Largest& part) {
+      take(k, part);
       const ContactImpulse<S>& before = last[rows[k].contact];
       if (ratio > S(0) && before.normal > S(0)) {
         guess(k, before, ratio);
       }
-      return excess;
     });
     largestApproach = most.value;
     active = largestApproach > S(0);
@@ -218,7 +217,8 @@ class ContactProblem {
   }
 
   /// What the present velocities ask for.
-  void aim(std::size_t k, const Contact<S>& c, const S& dt, const ContactSettings<S>& settings, bool loaded) {
+  [[gnu::flatten]] void aim(std::size_t k, const Contact<S>& c, const S& dt,
+                            const ContactSettings<S>& settings, bool loaded) {
     Row& row = rows[k];
     row.slides = 0;
     row.sliding = false;
@@ -270,7 +270,7 @@ class ContactProblem {
   }
 
   /// The impulse of the last step again.
-  void guess(std::size_t k, const ContactImpulse<S>& before, const S& ratio) {
+  [[gnu::flatten]] void guess(std::size_t k, const ContactImpulse<S>& before, const S& ratio) {
     Row& row = rows[k];
     Body& b1 = bodies[row.slot1];
     Body& b2 = bodies[row.slot2];

@@ -5,6 +5,7 @@
 
 #include <gravel/core/check.hpp>
 
+#include <algorithm>
 #include <string>
 
 namespace gravel {
@@ -32,10 +33,23 @@ struct ContactReport {
   std::size_t impacts = 0;      ///< blows that were dealt at their own time inside the step
   std::size_t postponed = 0;    ///< bodies with so many blows in the step that the rest was solved at its end
   int iterations = 0;           ///< sweeps
+  std::size_t looks = 0;        ///< contacts that were looked at, over all sweeps
   Scalar residual = Scalar(0);  ///< [1] largest change of a velocity in the last sweep / largest approach
   Scalar restitutionLoss = Scalar(0);  ///< [J] energy taken by normal impulses
   Scalar frictionLoss = Scalar(0);     ///< [J] energy taken by tangential impulses
   Scalar driftWork = Scalar(0);  ///< [J] energy put in by moving boundaries and by the shear of the domain
+
+  /// Another solve of the same step.
+  void addSolve(const ContactReport& solve) {
+    contacts = solve.contacts;
+    colours = solve.colours;
+    iterations += solve.iterations;
+    looks += solve.looks;
+    residual = std::max<Scalar>(residual, solve.residual);
+    restitutionLoss += solve.restitutionLoss;
+    frictionLoss += solve.frictionLoss;
+    driftWork += solve.driftWork;
+  }
 };
 
 /// Impulse of a contact on its second body [N s]; on the first its opposite.

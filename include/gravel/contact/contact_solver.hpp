@@ -55,15 +55,19 @@ class ContactSolver {
   void begin(std::span<const Contact<S>> contacts, const B& bodies) {
     contacts_ = contacts;
     fresh_ = true;
-    const bool same = sameAsBefore(contacts, bodies);
-    kinds_ = orderedSum(contacts.size(), chunk, ContactKinds{}, [&](std::size_t begin, std::size_t end) {
-      ContactKinds kinds;
-      for (std::size_t k = begin; k < end; ++k) {
-        kinds.include(contacts[k]);
-      }
-      return kinds;
-    });
-    if (!same) {
+    const bool asMany = contacts.size() == names_.size() && contacts.size() == coloring_.rows().size();
+    const Findings found =
+        orderedSum(contacts.size(), chunk, Findings{}, [&](std::size_t begin, std::size_t end) {
+          Findings part;
+          for (std::size_t k = begin; k < end; ++k) {
+            part.kinds.include(contacts[k]);
+            part.others += asMany && names_[k] == nameOf(contacts[k]) ? 0 : 1;
+          }
+          return part;
+        });
+    kinds_ = found.kinds;
+    // The same pairs of the same bodies: colours, and who is remembered, stay.
+    if (!asMany || found.others > 0 || !sameMovable(bodies)) {
       coloring_.build(contacts, bodies);
       handOn(contacts);
     }
@@ -160,17 +164,19 @@ class ContactSolver {
 
   static Name nameOf(const Contact<S>& c) { return {{c.key1, c.key2}, c.first, c.second}; }
 
-  /// The same pairs of the same bodies: colours, and who is remembered, stay.
+  /// What begin() looks for in the contacts.
+  struct Findings {
+    ContactKinds kinds;
+    std::size_t others = 0;  ///< that are not those of before
+    Findings& operator+=(const Findings& more) {
+      kinds += more.kinds;
+      others += more.others;
+      return *this;
+    }
+  };
+
   template <class B>
-  bool sameAsBefore(std::span<const Contact<S>> contacts, const B& bodies) const {
-    if (contacts.size() != names_.size() || contacts.size() != coloring_.rows().size()) {
-      return false;
-    }
-    for (std::size_t k = 0; k < contacts.size(); ++k) {
-      if (!(names_[k] == nameOf(contacts[k]))) {
-        return false;
-      }
-    }
+  bool sameMovable(const B& bodies) const {
     for (std::uint32_t slot = 0; slot < coloring_.bodies().size(); ++slot) {
       if (coloring_.movable(slot) != detail::isMovable(bodies, coloring_.bodies()[slot])) {
         return false;

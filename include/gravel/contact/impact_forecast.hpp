@@ -99,9 +99,7 @@ class ImpactForecast {
     const S& h = scene.settings.h;
     auto next = scene.held.begin();
     bool placed = false;
-    for (const Pair& pair : pairs) {
-      const std::uint32_t i = pair.first;
-      const std::uint32_t j = pair.second;
+    for (const auto& [i, j] : pairs) {
       const S reach = S(scene.bodies.radii()[i]) + S(scene.bodies.radii()[j]);
       // The common case, before anything else is loaded: not near enough.
       Vector3<S> drift = Vector3<S>::Zero();
@@ -134,13 +132,17 @@ class ImpactForecast {
   }
 
   template <class Scene>
-  static void predictWalls(const Scene& scene, std::uint32_t i, std::vector<Event>& out) {
+  void predictWalls(const Scene& scene, std::uint32_t i, std::vector<Event>& out) const {
     const S radius = scene.bodies.radii()[i];
     if (!(radius > S(0)) || !detail::isMovable(scene.bodies, i)) {
       return;
     }
     for (std::uint32_t w = 0; w < scene.walls.size(); ++w) {
       const RelativeFlight<S> flight = flightOf(scene, i, scene.walls[w]);
+      const S most = radius + ways_[i] + scene.settings.h * detail::sumAbs(scene.walls[w].velocity);
+      if (scene.walls[w].normal.dot(flight.r) > most) {
+        continue;
+      }
       if (const auto t = timeOfImpact<S>(flight, scene.walls[w].normal, radius, S(0))) {
         const std::uint64_t key1 = scene.bodies.ids()[i];
         const std::uint64_t key2 = boundaryKey(scene.walls[w].number);
@@ -207,8 +209,7 @@ class ImpactForecast {
 
   template <class Scene>
   void predict(const Scene& scene, const Pair& pair, const S& from) {
-    const std::uint32_t i = pair.first;
-    const std::uint32_t j = pair.second;
+    const auto& [i, j] = pair;
     if (isDone(scene, i) || isDone(scene, j) || !detail::canTouch(scene.bodies, i, j)) {
       return;
     }

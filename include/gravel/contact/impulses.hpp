@@ -29,6 +29,15 @@ Scalar maxAbs(const Vector3<Scalar>& v) {
   return largest;
 }
 
+template <Real Scalar>
+Scalar sumAbs(const Vector3<Scalar>& v) {
+  Scalar sum(0);
+  for (int c = 0; c < 3; ++c) {
+    sum += v[c] < Scalar(0) ? Scalar(-v[c]) : Scalar(v[c]);
+  }
+  return sum;
+}
+
 /// |v| of a vector whose square leaves the range of numbers.
 template <Real Scalar>
 Scalar scaledNorm(const Vector3<Scalar>& v) {

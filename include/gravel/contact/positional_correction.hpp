@@ -17,7 +17,8 @@ struct CorrectionSettings {
   Scalar cap = Scalar(0.5);
   Scalar tolerance =
       Scalar(1e-3);  ///< [1] > 0: sweeps end when the largest move is this times the largest overlap
-  /// [1] >= 0: overlaps that are right to this times the smaller radius are right.
+  /// [1] >= 0: overlaps that are right to this times the smallest radius of a contact are right; while all
+  /// are, and their mean is a tenth of it, nothing is moved.
   Scalar precision = Scalar(1e-4);
   int maxIterations = 20;  ///< >= 1
   /// A pair that is moved apart keeps its angular momentum: it turns the slower. Off: velocities stay.
@@ -59,20 +60,18 @@ class PositionalCorrection {
                             const CorrectionSettings<S>& settings) {
     moved_.clear();
     CorrectionReport<S> report;
-    prepare(contacts, colouring, bodies, settings, report);
-    if (!(report.largestOverlap > S(0)) || !(settings.factor > S(0))) {
-      return report;
-    }
-    S enough = settings.tolerance * report.largestOverlap;
-    if (smallest_ > S(0)) {
-      enough = std::max<S>(enough, settings.precision * smallest_);
-    }
-    if (!(report.largestOverlap * settings.factor > settings.precision * smallest_ / S(100))) {
+    const Extremes all = extremesOf(contacts, bodies);
+    report.largestOverlap = all.overlap;
+    const S right = contacts.empty() ? S(0) : S(settings.precision * all.radius);
+    const S mean = all.sum / S(static_cast<double>(std::max<std::size_t>(contacts.size(), 1)));
+    if (!(all.overlap > right || mean > right / S(10)) || !(settings.factor > S(0))) {
       return report;  // what resting contacts leave to each other
     }
+    prepare(contacts, colouring, bodies, settings);
+    const S enough = std::max<S>(settings.tolerance * all.overlap, right);
     do {
       // Lone contacts are right after one sweep.
-      const auto one = [&](std::size_t k) { return open(k, settings.keepAngularMomentum); };
+      const auto one = [&](std::size_t k, Opened& sum) { open(k, settings.keepAngularMomentum, sum); };
       Opened opened = detail::sumOverRows(0, colouring.loneCount(), Opened{}, one);
       opened += detail::sumOverColours(colouring, Opened{}, one);
       report.residual = opened.largest;
@@ -117,12 +116,14 @@ class PositionalCorrection {
   };
   static constexpr std::size_t chunk = 512;
 
-  /// The largest overlap, and the smallest radius.
+  /// The largest overlap, the sum of all, and the smallest radius.
   struct Extremes {
     S overlap = S(0);
+    S sum = S(0);
     S radius = Eigen::NumTraits<S>::highest();
     Extremes& operator+=(const Extremes& other) {
       overlap = std::max<S>(overlap, other.overlap);
+      sum += other.sum;
       radius = std::min<S>(radius, other.radius);
       return *this;
     }
@@ -138,9 +139,29 @@ class PositionalCorrection {
     }
   };
 
+  /// Of the two radii of a contact the smaller one that is not zero.
+  template <class B>
+  static S smallerRadius(const Contact<S>& c, const B& bodies) {
+    const S r1 = bodies.radii()[c.first];
+    const S r2 = c.second == staticPartner ? r1 : S(bodies.radii()[c.second]);
+    return r1 > S(0) && r2 > S(0) ? std::min<S>(r1, r2) : std::max<S>(r1, r2);
+  }
+
+  template <class B>
+  static Extremes extremesOf(std::span<const Contact<S>> contacts, const B& bodies) {
+    return orderedSum(contacts.size(), chunk, Extremes{}, [&](std::size_t begin, std::size_t end) {
+      Extremes part;
+      for (std::size_t k = begin; k < end; ++k) {
+        const S overlap = std::max<S>(S(0), -contacts[k].gap);
+        part += {overlap, overlap, smallerRadius(contacts[k], bodies)};
+      }
+      return part;
+    });
+  }
+
   template <class B>
   void prepare(std::span<const Contact<S>> contacts, const ContactColoring& colouring, const B& bodies,
-               const CorrectionSettings<S>& settings, CorrectionReport<S>& report) {
+               const CorrectionSettings<S>& settings) {
     const std::size_t n = colouring.bodies().size();
     shifts_.resize(n + 1);
     parallelFor(n + 1, chunk, [&](std::size_t slot) {
@@ -151,29 +172,18 @@ class PositionalCorrection {
                        Vector3<S>::Zero()};
     });
     rows_.resize(contacts.size());
-    const Extremes all = orderedSum(rows_.size(), chunk, Extremes{}, [&](std::size_t begin, std::size_t end) {
-      Extremes part;
-      for (std::size_t k = begin; k < end; ++k) {
-        part += fill(k, contacts, colouring, bodies, settings);
-      }
-      return part;
-    });
-    report.largestOverlap = all.overlap;
-    smallest_ = rows_.empty() ? S(0) : all.radius;
+    parallelFor(rows_.size(), chunk, [&](std::size_t k) { fill(k, contacts, colouring, bodies, settings); });
   }
 
   template <class B>
-  Extremes fill(std::size_t k, std::span<const Contact<S>> contacts, const ContactColoring& colouring,
-                const B& bodies, const CorrectionSettings<S>& settings) {
+  void fill(std::size_t k, std::span<const Contact<S>> contacts, const ContactColoring& colouring,
+            const B& bodies, const CorrectionSettings<S>& settings) {
     const ContactColoring::Row& place = colouring.rows()[k];
     const Contact<S>& c = contacts[place.contact];
     const S overlap = -c.gap;
     const bool boundary = c.second == staticPartner;
-    const S r1 = bodies.radii()[c.first];
-    const S r2 = boundary ? r1 : S(bodies.radii()[c.second]);
-    const S smaller = r1 > S(0) && r2 > S(0) ? std::min<S>(r1, r2) : std::max<S>(r1, r2);
     const S kept =
-        std::max<S>(overlap - settings.cap * smaller,
+        std::max<S>(overlap - settings.cap * smallerRadius(c, bodies),
                     std::max<S>((S(1) - settings.factor) * overlap, std::min<S>(settings.slop, overlap)));
     const S m1 = shifts_[place.slot1].mass;
     const S m2 = shifts_[place.slot2].mass;
@@ -188,10 +198,9 @@ class PositionalCorrection {
                    place.slot1,
                    place.slot2,
                    boundary};
-    return {overlap, smaller};
   }
 
-  Opened open(std::size_t k, bool keepAngularMomentum) {
+  [[gnu::flatten]] void open(std::size_t k, bool keepAngularMomentum, Opened& sum) {
     const Row& row = rows_[k];
     Shift& b1 = shifts_[row.slot1];
     Shift& b2 = shifts_[row.slot2];
@@ -204,7 +213,7 @@ class PositionalCorrection {
     } else {
       const Vector3<S> r = row.r + d;
       if (r.squaredNorm() > row.reach * row.reach) {
-        return {};  // far enough, unless squares underflow
+        return;  // far enough, unless squares underflow
       }
       distance = detail::safeNorm(r);
       missing = row.reach - distance;
@@ -213,7 +222,7 @@ class PositionalCorrection {
       }
     }
     if (!(missing > S(0))) {
-      return {};
+      return;
     }
     Opened opened{missing, S(0)};
     if (keepAngularMomentum && row.share1 > S(0) && row.share2 > S(0)) {
@@ -230,11 +239,10 @@ class PositionalCorrection {
     if (row.share2 > S(0)) {
       b2.d += (row.share2 * missing) * n;
     }
-    return opened;
+    sum += opened;
   }
 
   std::vector<Shift> shifts_;
-  S smallest_ = S(0);  ///< smallest radius of a contact
   std::vector<Row> rows_;
   std::vector<Displacement<S>> moved_;
 };

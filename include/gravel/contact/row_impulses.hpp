@@ -19,10 +19,14 @@ struct RowImpulses {
     S change_sq = S(0);
     S along = S(0);
     S size = S(0);
+    std::size_t changed = 0;  ///< rows by more than they may
+    std::size_t looked = 0;   ///< rows that were not passed over
     Progress& operator+=(const Progress& other) {
       change_sq = std::max<S>(change_sq, other.change_sq);
       along += other.along;
       size += other.size;
+      changed += other.changed;
+      looked += other.looked;
       return *this;
     }
   };

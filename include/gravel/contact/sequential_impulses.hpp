@@ -8,6 +8,7 @@
 
 #include <gravel/contact/contact_energy.hpp>
 #include <gravel/contact/row_impulses.hpp>
+#include <gravel/contact/sweep_momentum.hpp>
 
 namespace gravel {
 
@@ -19,8 +20,10 @@ namespace gravel {
 /// grown to twice their least, it is held at 0.8; and where the least changes so far have not shrunk by a
 /// third in thirty-two sweeps, more of them would wander between the many solutions that friction leaves
 /// open, and it ends: the next step goes on from there. Sweeps have the last word: results obey the cone.
-/// Shares the contacts of a large colour between threads; the same bits for any number of threads.
-/// O(contacts) a sweep.
+/// Where the first sweep changes few contacts, as in a heap at rest with some rattlers, the next ones look
+/// only at those that have moved since by more than half of what ends the sweeps, and go without momentum,
+/// until they have looked at as many contacts as there are. Shares the contacts of a large colour between
+/// threads; the same bits for any number of threads. O(contacts) a sweep.
 template <Real S>
 class SequentialImpulses : private detail::RowImpulses<S> {
   using Base = detail::RowImpulses<S>;
@@ -42,58 +45,62 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     using std::sqrt;
     ContactReport<S> report;
     detail::sumOverRows(0, colouring.loneCount(), Progress{},
-                        [&](std::size_t k) { return strike(problem, k); });
+                        [&](std::size_t k, Progress& /*sum*/) { strike(problem, k); });
+    report.looks = colouring.loneCount();
     if (colouring.loneCount() == problem.rows.size()) {
       report.iterations = 1;  // exact
       return report;
     }
     const S rounding = S(8) * Eigen::NumTraits<S>::epsilon();
     const S enough = std::max<S>(settings.tolerance, rounding) * problem.largestApproach;
-    const bool friction = problem.friction;
-    S beta(0);
-    S limit(1);
-    S leastSize = Eigen::NumTraits<S>::highest();
-    S sizeThen = leastSize;
-    int age = 0;
-    int turns = 0;
     const bool accelerate = settings.accelerate && settings.maxIterations > 2;
     if (accelerate) {
       begin(problem);
     }
+    watch(problem, S(enough / S(2)));
+    const std::size_t count = problem.rows.size() - colouring.loneCount();
+    bool local = false;
+    detail::SweepMomentum<S> momentum;
     while (true) {
-      const Progress now = detail::sumOverColours(colouring, Progress{}, [&](std::size_t k) {
-        return friction ? relax<true>(problem, k, beta) : relax<false>(problem, k, beta);
+      const Progress now = detail::sumOverColours(colouring, Progress{}, [&](std::size_t k, Progress& sum) {
+        if (local) {
+          relaxStale(problem, k, sum);
+        } else {
+          relaxNext(problem, k, momentum.beta, report.iterations == 0, sum);
+        }
       });
       ++report.iterations;
+      report.looks += local ? now.looked : count;
       const S change = sqrt(now.change_sq);
       report.residual = change / problem.largestApproach;
       if (!(change > enough) || report.iterations >= settings.maxIterations) {
         return report;
       }
-      if (accelerate) {
-        const S old = beta;
-        turns += now.along < S(0) ? 1 : 0;
-        age = now.along < S(0) ? 0 : age + 1;
-        leastSize = std::min<S>(leastSize, now.size);
-        if (friction && report.iterations % stallSweeps == 0) {
-          if (turns > 2 && !(leastSize < sizeThen / S(2))) {
-            return report;
-          }
-          turns = 0;
-          sizeThen = leastSize;
+      local = report.iterations == 1 ? now.changed < count / 8 : local;
+      if (local) {
+        local = report.looks < 2 * problem.rows.size();
+        if (!local && accelerate) {
+          begin(problem);
         }
-        if (friction && now.size > S(4) * leastSize) {
-          limit = S(0.8);
+      } else if (accelerate) {
+        const S old = momentum.beta;
+        if (momentum.stalls(now.along, now.size, problem.friction, report.iterations)) {
+          return report;
         }
-        beta = std::min<S>(S(age) / S(age + 3), limit);
-        coast(problem, old, beta);
+        coast(problem, old, momentum.beta);
       }
     }
   }
 
  private:
   static constexpr std::size_t chunk = 512;
-  static constexpr int stallSweeps = 32;
+
+  /// How far the velocities at the two ends of a row had moved when it was right.
+  struct Watch {
+    std::uint32_t slot1;
+    std::uint32_t slot2;
+    S moved;
+  };
 
   /// Step of a body's velocities from sweep to sweep.
   struct BodyStep {
@@ -108,6 +115,13 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     parallelFor(problem.bodies.size(), chunk, [&](std::size_t slot) {
       bodySteps_[slot] = BodyStep{problem.bodies[slot].v, problem.bodies[slot].s};
     });
+  }
+
+  /// From here on it is watched who moves; by no more than `still` is not at all.
+  void watch(const ContactProblem<S>& problem, const S& still) {
+    still_ = still;
+    moved_.assign(problem.bodies.size(), S(0));
+    watches_.resize(problem.rows.size());
   }
 
   /// Velocities follow the impulses beyond their last step: they are linear in the impulses.
@@ -127,13 +141,13 @@ class SequentialImpulses : private detail::RowImpulses<S> {
   }
 
   /// A contact alone: in two strokes, stop and rebound, so that a head-on blow ends at exactly its target.
-  static Progress strike(ContactProblem<S>& problem, std::size_t k) {
+  static void strike(ContactProblem<S>& problem, std::size_t k) {
     Row& row = problem.rows[k];
     Body& b1 = problem.bodies[row.slot1];
     Body& b2 = problem.bodies[row.slot2];
     const S v_n = detail::normalVelocity(row, b1, b2);
     if (!(v_n < row.target)) {
-      return {};
+      return;
     }
     const S share1 = b1.inverseMass / (b1.inverseMass + b2.inverseMass);
     const S share2 = b2.inverseMass / (b1.inverseMass + b2.inverseMass);
@@ -164,24 +178,43 @@ class SequentialImpulses : private detail::RowImpulses<S> {
         }
       }
     }
-    return {};
   }
 
-  /// First on along the last step, then to where this contact is right. The normal impulse leaves the slip as
-  /// it is, so that both are found from the same velocities.
-  template <bool Friction>
-  static Progress relax(ContactProblem<S>& problem, std::size_t k, const S& beta) {
-    Row& row = problem.rows[k];
+  /// A row in the order of all. \param watched whether others may be passed over afterwards
+  void relaxNext(ContactProblem<S>& problem, std::size_t k, const S& beta, bool watched, Progress& sum) {
     if (k + ContactProblem<S>::lookAhead < problem.rows.size()) {
       const Row& later = problem.rows[k + ContactProblem<S>::lookAhead];
       detail::prefetch(problem.bodies[later.slot1]);
       detail::prefetch(problem.bodies[later.slot2]);
     }
+    if (watched) {
+      problem.friction ? relax<true, true>(problem, k, beta, sum) : relax<false, true>(problem, k, beta, sum);
+    } else {
+      problem.friction ? relax<true, false>(problem, k, beta, sum)
+                       : relax<false, false>(problem, k, beta, sum);
+    }
+  }
+
+  /// A row, unless its ends stand nearly as they did when it was right.
+  void relaxStale(ContactProblem<S>& problem, std::size_t k, Progress& sum) {
+    const Watch& then = watches_[k];
+    if (moved_[then.slot1] + moved_[then.slot2] > then.moved + still_) {
+      problem.friction ? relax<true, true>(problem, k, S(0), sum) : relax<false, true>(problem, k, S(0), sum);
+      ++sum.looked;
+    }
+  }
+
+  /// First on along the last step (none while it is watched), then to where this contact is right. The normal
+  /// impulse leaves the slip as it is, so that both are found from the same velocities.
+  template <bool Friction, bool Watched>
+  [[gnu::flatten]] void relax(ContactProblem<S>& problem, std::size_t k, const S& beta, Progress& sum) {
+    using std::sqrt;
+    Row& row = problem.rows[k];
     Body& b1 = problem.bodies[row.slot1];
     Body& b2 = problem.bodies[row.slot2];
     const Vector3<S> v_rel = b2.v - b1.v;
     const S v_n = row.n.dot(v_rel);
-    row.stepN *= beta;
+    row.stepN = Watched ? S(0) : S(row.stepN * beta);
     const S jn = row.jn + row.stepN;
     const S next = jn + row.normalMass * (row.target - v_n);
     row.jn = next > S(0) ? next : S(0);
@@ -193,10 +226,17 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     progress.along = row.stepN * change;
     progress.size = dj * change;
     Vector3<S> j = dj * row.n;
+    S push_t(0);  // |its part across n|, or more
+    S turn1(0);
+    S turn2(0);
     if constexpr (Friction) {
       if (row.stick > S(0)) {
-        row.stepU *= beta;
-        row.u += row.stepU;
+        if constexpr (Watched) {
+          row.stepU.setZero();
+        } else {
+          row.stepU *= beta;
+          row.u += row.stepU;
+        }
         if (row.jn > S(0) || row.u != Vector3<S>::Zero()) {
           Vector3<S> slip = v_rel - v_n * row.n - Vector3<S>(row.c1 * b1.s + row.c2 * b2.s).cross(row.n);
           if (!problem.slipTargets.empty()) {
@@ -205,6 +245,11 @@ class SequentialImpulses : private detail::RowImpulses<S> {
           const Vector3<S> dt = rubbed(row, slip, progress);
           j += dt;
           detail::twist(row, b1, b2, dt);
+          if constexpr (Watched) {
+            push_t = detail::sumAbs(dt);
+            turn1 = row.c1 * b1.spin * push_t;
+            turn2 = row.c2 * b2.spin * push_t;
+          }
         }
       }
     }
@@ -213,15 +258,37 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     }
     if constexpr (Friction) {
       if (!problem.turning.empty()) {
-        problem.turning[k].step *= beta;
+        problem.turning[k].step *= Watched ? S(0) : beta;
         problem.turning[k].l += problem.turning[k].step;
-        progress += resist(problem, k, b1, b2);
+        const Progress resisted = resist(problem, k, b1, b2);
+        if constexpr (Watched) {
+          const detail::TurningRow<S>& row2 = problem.turning[k];
+          const S l = row2.mass * S(sqrt(resisted.change_sq));
+          turn1 += row2.q1 * b1.spin * l;
+          turn2 += row2.q2 * b2.spin * l;
+        }
+        progress += resisted;
       }
     }
-    return progress;
+    if constexpr (Watched) {
+      const S push = (dj < S(0) ? S(-dj) : dj) + push_t;
+      S moved(0);
+      if (b1.inverseMass > S(0)) {
+        moved += moved_[row.slot1] += b1.inverseMass * push + turn1;
+      }
+      if (b2.inverseMass > S(0)) {
+        moved += moved_[row.slot2] += b2.inverseMass * push + turn2;
+      }
+      watches_[k] = {row.slot1, row.slot2, moved};
+      progress.changed = progress.change_sq > still_ * still_ ? 1 : 0;
+    }
+    sum += progress;
   }
 
   std::vector<BodyStep> bodySteps_;
+  std::vector<S> moved_;  ///< by slot: sum of the changes of v and s since watch(), of their sizes or more
+  std::vector<Watch> watches_;  ///< by row
+  S still_ = S(0);
 };
 
 }  // namespace gravel

@@ -139,13 +139,7 @@ class ContactStage {
     if (!acted_) {
       solver_.forget();  // its impulses are those of the solve before
     }
-    report_.contacts = half.contacts;
-    report_.colours = half.colours;
-    report_.iterations += half.iterations;
-    report_.residual = std::max(report_.residual, half.residual);
-    report_.restitutionLoss += half.restitutionLoss;
-    report_.frictionLoss += half.frictionLoss;
-    report_.driftWork += half.driftWork;
+    report_.addSolve(half);
   }
 
   /// Bodies are not those of the contacts any more.
