@@ -4,6 +4,7 @@
 /// Removes overlap by moving positions: no energy of motion is made.
 
 #include <gravel/contact/contact_coloring.hpp>
+#include <gravel/contact/row_watch.hpp>
 #include <gravel/core/parallel.hpp>
 
 namespace gravel {
@@ -43,7 +44,8 @@ struct CorrectionReport {
 /// Nonlinear projected Gauss-Seidel over the colours of the contacts: in turn each contact that is still
 /// closer than it should be is opened along its present normal, by inverse mass, so that the common centre of
 /// mass of movable bodies stays to rounding. Distances are recomputed from the moved positions; only relative
-/// displacements enter, so that a place far from the origin costs no digits.
+/// displacements enter, so that a place far from the origin costs no digits. After the first sweep a contact
+/// is passed over while its bodies have moved since by less than half of what ends the sweeps.
 ///
 /// Two free spheres that are moved apart from r to r + d would gain the angular momentum m* d x v of their
 /// relative velocity v. As on an orbit, the part of v across r becomes v_t r/(r + d) instead: momentum and
@@ -69,9 +71,15 @@ class PositionalCorrection {
     }
     prepare(contacts, colouring, bodies, settings);
     const S enough = std::max<S>(settings.tolerance * all.overlap, right);
+    watch_.begin(shifts_.size(), rows_.size(), S(enough / S(2)));
     do {
       // Lone contacts are right after one sweep.
-      const auto one = [&](std::size_t k, Opened& sum) { open(k, settings.keepAngularMomentum, sum); };
+      const auto one = [&](std::size_t k, Opened& sum) {
+        if (report.iterations == 0 || watch_.isStale(k)) {
+          open(k, settings.keepAngularMomentum, sum);
+          watch_.enter(k, rows_[k].slot1, rows_[k].slot2);
+        }
+      };
       Opened opened = detail::sumOverRows(0, colouring.loneCount(), Opened{}, one);
       opened += detail::sumOverColours(colouring, Opened{}, one);
       report.residual = opened.largest;
@@ -235,14 +243,17 @@ class PositionalCorrection {
     }
     if (row.share1 > S(0)) {  // immovable bodies are shared between threads: never written
       b1.d -= (row.share1 * missing) * n;
+      watch_.move(row.slot1, row.share1 * missing);
     }
     if (row.share2 > S(0)) {
       b2.d += (row.share2 * missing) * n;
+      watch_.move(row.slot2, row.share2 * missing);
     }
     sum += opened;
   }
 
   std::vector<Shift> shifts_;
+  detail::RowWatch<S> watch_;
   std::vector<Row> rows_;
   std::vector<Displacement<S>> moved_;
 };

@@ -8,6 +8,7 @@
 
 #include <gravel/contact/contact_energy.hpp>
 #include <gravel/contact/row_impulses.hpp>
+#include <gravel/contact/row_watch.hpp>
 #include <gravel/contact/sweep_momentum.hpp>
 
 namespace gravel {
@@ -57,7 +58,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     if (accelerate) {
       begin(problem);
     }
-    watch(problem, S(enough / S(2)));
+    watch_.begin(problem.bodies.size(), problem.rows.size(), S(enough / S(2)));
     const std::size_t count = problem.rows.size() - colouring.loneCount();
     bool local = false;
     detail::SweepMomentum<S> momentum;
@@ -95,13 +96,6 @@ class SequentialImpulses : private detail::RowImpulses<S> {
  private:
   static constexpr std::size_t chunk = 512;
 
-  /// How far the velocities at the two ends of a row had moved when it was right.
-  struct Watch {
-    std::uint32_t slot1;
-    std::uint32_t slot2;
-    S moved;
-  };
-
   /// Step of a body's velocities from sweep to sweep.
   struct BodyStep {
     Vector3<S> v;
@@ -115,13 +109,6 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     parallelFor(problem.bodies.size(), chunk, [&](std::size_t slot) {
       bodySteps_[slot] = BodyStep{problem.bodies[slot].v, problem.bodies[slot].s};
     });
-  }
-
-  /// From here on it is watched who moves; by no more than `still` is not at all.
-  void watch(const ContactProblem<S>& problem, const S& still) {
-    still_ = still;
-    moved_.assign(problem.bodies.size(), S(0));
-    watches_.resize(problem.rows.size());
   }
 
   /// Velocities follow the impulses beyond their last step: they are linear in the impulses.
@@ -197,8 +184,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
 
   /// A row, unless its ends stand nearly as they did when it was right.
   void relaxStale(ContactProblem<S>& problem, std::size_t k, Progress& sum) {
-    const Watch& then = watches_[k];
-    if (moved_[then.slot1] + moved_[then.slot2] > then.moved + still_) {
+    if (watch_.isStale(k)) {
       problem.friction ? relax<true, true>(problem, k, S(0), sum) : relax<false, true>(problem, k, S(0), sum);
       ++sum.looked;
     }
@@ -272,23 +258,20 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     }
     if constexpr (Watched) {
       const S push = (dj < S(0) ? S(-dj) : dj) + push_t;
-      S moved(0);
       if (b1.inverseMass > S(0)) {
-        moved += moved_[row.slot1] += b1.inverseMass * push + turn1;
+        watch_.move(row.slot1, b1.inverseMass * push + turn1);
       }
       if (b2.inverseMass > S(0)) {
-        moved += moved_[row.slot2] += b2.inverseMass * push + turn2;
+        watch_.move(row.slot2, b2.inverseMass * push + turn2);
       }
-      watches_[k] = {row.slot1, row.slot2, moved};
-      progress.changed = progress.change_sq > still_ * still_ ? 1 : 0;
+      watch_.enter(k, row.slot1, row.slot2);
+      progress.changed = progress.change_sq > watch_.still() * watch_.still() ? 1 : 0;
     }
     sum += progress;
   }
 
   std::vector<BodyStep> bodySteps_;
-  std::vector<S> moved_;  ///< by slot: sum of the changes of v and s since watch(), of their sizes or more
-  std::vector<Watch> watches_;  ///< by row
-  S still_ = S(0);
+  detail::RowWatch<S> watch_;
 };
 
 }  // namespace gravel
