@@ -18,8 +18,8 @@ struct CorrectionSettings {
   Scalar cap = Scalar(0.5);
   Scalar tolerance =
       Scalar(1e-3);  ///< [1] > 0: sweeps end when the largest move is this times the largest overlap
-  /// [1] >= 0: overlaps that are right to this times the smallest radius of a contact are right; while all
-  /// are, and their mean is a tenth of it, nothing is moved.
+  /// [1] >= 0: overlaps that are right to this times the smallest radius of a contact are right; nothing is
+  /// moved while all are below a hundredth of that.
   Scalar precision = Scalar(1e-4);
   int maxIterations = 20;  ///< >= 1
   /// A pair that is moved apart keeps its angular momentum: it turns the slower. Off: velocities stay.
@@ -65,9 +65,11 @@ class PositionalCorrection {
     const Extremes all = extremesOf(contacts, bodies);
     report.largestOverlap = all.overlap;
     const S right = contacts.empty() ? S(0) : S(settings.precision * all.radius);
-    const S mean = all.sum / S(static_cast<double>(std::max<std::size_t>(contacts.size(), 1)));
-    if (!(all.overlap > right || mean > right / S(10)) || !(settings.factor > S(0))) {
-      return report;  // what resting contacts leave to each other
+    // What resting contacts leave to each other. To wait until an overlap reaches `right` saves an eighth of
+    // the step of a settled heap, but lifting all at once then turns the friction at walls around: a floor
+    // carried up to 7 % more than the weight where it carries 3 to 7 % less.
+    if (!(all.overlap * settings.factor > right / S(100))) {
+      return report;
     }
     prepare(contacts, colouring, bodies, settings);
     const S enough = std::max<S>(settings.tolerance * all.overlap, right);
@@ -124,14 +126,12 @@ class PositionalCorrection {
   };
   static constexpr std::size_t chunk = 512;
 
-  /// The largest overlap, the sum of all, and the smallest radius.
+  /// The largest overlap, and the smallest radius.
   struct Extremes {
     S overlap = S(0);
-    S sum = S(0);
     S radius = Eigen::NumTraits<S>::highest();
     Extremes& operator+=(const Extremes& other) {
       overlap = std::max<S>(overlap, other.overlap);
-      sum += other.sum;
       radius = std::min<S>(radius, other.radius);
       return *this;
     }
@@ -160,8 +160,7 @@ class PositionalCorrection {
     return orderedSum(contacts.size(), chunk, Extremes{}, [&](std::size_t begin, std::size_t end) {
       Extremes part;
       for (std::size_t k = begin; k < end; ++k) {
-        const S overlap = std::max<S>(S(0), -contacts[k].gap);
-        part += {overlap, overlap, smallerRadius(contacts[k], bodies)};
+        part += {S(-contacts[k].gap), smallerRadius(contacts[k], bodies)};
       }
       return part;
     });
