@@ -114,7 +114,7 @@ Heap heapAfterWalls(double friction, double rolling, std::uint64_t seed, const S
 // Six seeds of each: 9.4 with a standard deviation of 2.6, and 30.5 with 2.5 degrees; bounds at four of them.
 // Larger heaps, with friction in between: docs/accuracy-and-speed.md. Seen to fail: steps of 0.2 sqrt(d/g),
 // at which flanks creep away.
-TEST_CASE("The angle of repose grows with friction, and is that of beads") {
+TEST_CASE("Grains with friction stand at an angle where smooth ones run off") {
   const Heap smooth = heapAfterWalls(0.0, 0.0, 2);
   const Heap rough = heapAfterWalls(0.6, 0.0, 2);
   CAPTURE(smooth.angle, rough.angle, rough.speed);

@@ -29,6 +29,7 @@ Scalar maxAbs(const Vector3<Scalar>& v) {
   return largest;
 }
 
+/// |x| + |y| + |z|, at least |v|; from comparisons alone.
 template <Real Scalar>
 Scalar sumAbs(const Vector3<Scalar>& v) {
   Scalar sum(0);

@@ -65,7 +65,7 @@ class PositionalCorrection {
     const Extremes all = extremesOf(contacts, bodies);
     report.largestOverlap = all.overlap;
     const S right = contacts.empty() ? S(0) : S(settings.precision * all.radius);
-    // What resting contacts leave to each other. To wait until an overlap reaches `right` saves an eighth of
+    // What resting contacts leave to each other. To wait until an overlap reaches `right` saves a sixth of
     // the step of a settled heap, but lifting all at once then turns the friction at walls around: a floor
     // carried up to 7 % more than the weight where it carries 3 to 7 % less.
     if (!(all.overlap * settings.factor > right / S(100))) {

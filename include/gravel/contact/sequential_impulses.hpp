@@ -77,7 +77,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       if (!(change > enough) || report.iterations >= settings.maxIterations) {
         return report;
       }
-      local = report.iterations == 1 ? now.changed < count / 8 : local;
+      local = report.iterations == 1 ? now.changed < count / few : local;
       if (local) {
         local = report.looks < 2 * problem.rows.size();
         if (!local && accelerate) {
@@ -95,6 +95,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
 
  private:
   static constexpr std::size_t chunk = 512;
+  static constexpr std::size_t few = 8;  ///< one contact in so many
 
   /// Step of a body's velocities from sweep to sweep.
   struct BodyStep {
@@ -174,26 +175,27 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       detail::prefetch(problem.bodies[later.slot1]);
       detail::prefetch(problem.bodies[later.slot2]);
     }
-    if (watched) {
-      problem.friction ? relax<true, true>(problem, k, beta, sum) : relax<false, true>(problem, k, beta, sum);
-    } else {
-      problem.friction ? relax<true, false>(problem, k, beta, sum)
-                       : relax<false, false>(problem, k, beta, sum);
-    }
+    watched ? relax<true>(problem, k, beta, sum) : relax<false>(problem, k, beta, sum);
   }
 
   /// A row, unless its ends stand nearly as they did when it was right.
   void relaxStale(ContactProblem<S>& problem, std::size_t k, Progress& sum) {
     if (watch_.isStale(k)) {
-      problem.friction ? relax<true, true>(problem, k, S(0), sum) : relax<false, true>(problem, k, S(0), sum);
+      relax<true>(problem, k, S(0), sum);
       ++sum.looked;
     }
+  }
+
+  template <bool Watched>
+  void relax(ContactProblem<S>& problem, std::size_t k, const S& beta, Progress& sum) {
+    problem.friction ? relaxRow<true, Watched>(problem, k, beta, sum)
+                     : relaxRow<false, Watched>(problem, k, beta, sum);
   }
 
   /// First on along the last step (none while it is watched), then to where this contact is right. The normal
   /// impulse leaves the slip as it is, so that both are found from the same velocities.
   template <bool Friction, bool Watched>
-  [[gnu::flatten]] void relax(ContactProblem<S>& problem, std::size_t k, const S& beta, Progress& sum) {
+  [[gnu::flatten]] void relaxRow(ContactProblem<S>& problem, std::size_t k, const S& beta, Progress& sum) {
     using std::sqrt;
     Row& row = problem.rows[k];
     Body& b1 = problem.bodies[row.slot1];

@@ -166,7 +166,7 @@ class Profiler {
   }
 
   std::array<Entry, phaseCount> entries_{};
-  std::array<std::uint8_t, phaseCount> skipped_{};  // times in this step
+  std::array<std::uint64_t, phaseCount> skipped_{};  // times in this step
   Entry* running_ = nullptr;
   Clock::time_point since_{};
   bool timed_ = true;
