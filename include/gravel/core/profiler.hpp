@@ -38,7 +38,8 @@ constexpr const char* phaseName(Phase phase) {
 /// Adds up wall-clock seconds, calls and skips by phase. Not shared between threads: a phase is entered by
 /// the thread that drives the step. Two readings of the clock a phase, about 50 ns; of steps shorter than 8
 /// us, which that would slow down by more than a hundredth, one in 16 is timed and counts for all, of those
-/// shorter than 0.5 us one in 256.
+/// shorter than 0.5 us one in 256. So it is with the runs inside another phase in one step, beyond the first: some
+/// methods take thousands of steps of their own.
 class Profiler {
  public:
   struct Entry {
@@ -47,25 +48,52 @@ class Profiler {
     std::uint64_t skips = 0;
     const char* reason = nullptr;  ///< why it was skipped the last time; a string literal
     const char* method = nullptr;  ///< how it was done the last time, where there is a choice; a literal
+    std::uint64_t every = 1;       ///< of so many runs inside another phase one is timed
+    std::uint64_t untimed = 0;     ///< such runs since
+    std::uint64_t step = 0;        ///< of the last one timed
   };
 
   /// Times the rest of the enclosing scope. Where scopes nest, the outer one's clock stands still meanwhile,
   /// so that the seconds of all phases add up to the time passed.
   class Scope {
    public:
-    Scope(Profiler& profiler, Phase phase) : profiler_(profiler), outer_(profiler.running_) {
-      profiler_.change(&profiler_.entries_[static_cast<std::size_t>(phase)]);
+    Scope(Profiler& profiler, Phase phase)
+        : profiler_(profiler),
+          entry_(profiler.entries_[static_cast<std::size_t>(phase)]),
+          outer_(profiler.running_),
+          timed_(outer_ == nullptr || !profiler.timed_ || entry_.untimed + 1 >= entry_.every ||
+                 entry_.step != profiler.step_),
+          before_(entry_.seconds) {
+      if (timed_) {
+        profiler_.change(&entry_);
+      }
     }
     Scope(const Scope&) = delete;
     Scope& operator=(const Scope&) = delete;
     ~Scope() {
-      ++profiler_.running_->calls;
+      ++entry_.calls;
+      if (!timed_) {
+        ++entry_.untimed;
+        return;
+      }
       profiler_.change(outer_);
+      if (outer_ != nullptr && outer_ != &entry_ && profiler_.timed_) {
+        const double own = entry_.seconds - before_;
+        const double others = own * static_cast<double>(entry_.untimed);  // were booked on the outer one
+        entry_.seconds += others;
+        outer_->seconds -= others;
+        entry_.every = sampleOf(own / profiler_.weight_);
+        entry_.untimed = 0;
+        entry_.step = profiler_.step_;
+      }
     }
 
    private:
     Profiler& profiler_;
+    Entry& entry_;
     Entry* outer_;
+    bool timed_;
+    double before_;
   };
 
   /// Its life is one step; phases outside any step are always timed.
@@ -90,13 +118,14 @@ class Profiler {
 
    private:
     void begin() {
+      ++profiler_.step_;
       profiler_.timed_ = profiler_.untimed_ + 1 >= profiler_.every_;
       profiler_.weight_ = profiler_.timed_ ? static_cast<double>(profiler_.untimed_ + 1) : 0.0;
       profiler_.passed_ = 0.0;
     }
     void end() {
       if (profiler_.timed_) {
-        profiler_.every_ = profiler_.passed_ < 0.5e-6 ? 256 : profiler_.passed_ < 8e-6 ? 16 : 1;
+        profiler_.every_ = sampleOf(profiler_.passed_);
         profiler_.untimed_ = 0;
       } else {
         ++profiler_.untimed_;
@@ -151,6 +180,11 @@ class Profiler {
  private:
   using Clock = std::chrono::steady_clock;
 
+  /// Of how many runs that take so long [s] one is timed.
+  static constexpr std::uint64_t sampleOf(double seconds) {
+    return seconds < 0.5e-6 ? 256 : seconds < 8e-6 ? 16 : 1;
+  }
+
   /// Books the time since the last change on the running entry, and lets `next` run.
   void change(Entry* next) {
     if (timed_) {
@@ -174,6 +208,7 @@ class Profiler {
   double passed_ = 0.0;        // [s] in all phases of this step
   std::uint64_t every_ = 1;    // of so many steps one is timed
   std::uint64_t untimed_ = 0;  // steps since
+  std::uint64_t step_ = 0;
 };
 
 }  // namespace gravel
