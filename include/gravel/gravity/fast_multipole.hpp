@@ -46,7 +46,7 @@ class FastMultipole {
     if (std::is_same_v<S, float> && tolerance < S(3e-6)) {
       return false;
     }
-    return bodies >= detail::planMultipoles(tolerance).crossover;
+    return bodies >= detail::multipoleCrossover(tolerance);
   }
 
   /// As DirectSum::accelerations.

@@ -93,14 +93,35 @@ struct PairTable {
   /// a body with itself has no distance and so no force.
   void addWithin(std::size_t begin, std::size_t end) {
     for (std::size_t tile = begin; tile < end; tile += width) {
-      for (std::size_t j = tile; j < tile + width; ++j) {
-        addOneWay(tile, tile + width, j);
-      }
+      addTile(tile);
       const std::size_t rest = tile + width;
       for (std::size_t j = tile; j < rest; j += Tile::sources) {
         addSources(rest, end - rest, j, ax.data() + rest, ay.data() + rest, az.data() + rest);
       }
     }
+  }
+
+  /// The pairs within a tile, each way by itself. Apart from addOneWay, whose sums would wait for each other.
+  [[gnu::flatten]] void addTile(std::size_t tile) {
+    const T xi = Tile::load(&x[tile]);
+    const T yi = Tile::load(&y[tile]);
+    const T zi = Tile::load(&z[tile]);
+    T axi = Tile::constant(S(0));
+    T ayi = axi;
+    T azi = axi;
+    for (std::size_t j = tile; j < tile + width; ++j) {
+      const T dx = x[j] - xi;
+      const T dy = y[j] - yi;
+      const T dz = z[j] - zi;
+      const T s = dx * dx + dy * dy + dz * dz + softening_sq;
+      const T f = m[j] * PairLaw<S>::accelerationFactor(s);
+      axi += f * dx;
+      ayi += f * dy;
+      azi += f * dz;
+    }
+    Tile::store(&ax[tile], Tile::load(&ax[tile]) + axi);
+    Tile::store(&ay[tile], Tile::load(&ay[tile]) + ayi);
+    Tile::store(&az[tile], Tile::load(&az[tile]) + azi);
   }
 
   /// What the source j does to a range.
