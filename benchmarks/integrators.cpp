@@ -2,7 +2,8 @@
 /// sphere of 1000 bodies, a tight binary among 300, a bounce under mutual gravity and a patch of a ring, over
 /// a range of steps. Writes comma-separated values to standard output:
 ///   problem,integrator,step,seconds,force_calls,energy_error,position_error
-/// `integrators [problem]`; docs/images/integrators.py draws the plots. Processor seconds of one thread: set
+/// (force calls for all bodies; those for some bodies count by their share)
+/// `integrators [problem]`; benchmarks/integrators.py draws the plots. Processor seconds of one thread: set
 /// OMP_NUM_THREADS=1.
 
 #include "scenes/scenes.hpp"
@@ -72,9 +73,10 @@ void run(const Problem& problem, IntegratorKind kind, double step, double factor
     size += x.squaredNorm();
   }
   const bool ownSteps = traitsOf(kind).forceEvaluations == 0;
+  const std::uint64_t calls = space.profiler().entry(Phase::Gravity).calls + space.individualSteps() / space.n();
   std::printf("%s,%s%s,%.6g,%.6g,%llu,%.4g,%.4g\n", problem.name, traitsOf(kind).name,
               step > 0.0 || ownSteps ? "" : " adaptive", step > 0.0 ? step : factor, seconds,
-              static_cast<unsigned long long>(space.profiler().entry(Phase::Gravity).calls), energy,
+              static_cast<unsigned long long>(calls), energy,
               std::sqrt(place / size));
   std::fflush(stdout);
 }

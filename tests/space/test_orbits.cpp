@@ -100,6 +100,7 @@ TEST_CASE("Steps end where they are asked to, whatever the method takes inside")
 
 TEST_CASE("Hermite's steps follow timeStepFactor, and a user's own force is refused with it") {
   double errors[2];
+  std::uint64_t single[2];
   for (const double factor : {0.02, 0.02 / 16}) {
     SimulationConfig<double> config;
     config.G = 1;
@@ -114,6 +115,7 @@ TEST_CASE("Hermite's steps follow timeStepFactor, and a user's own force is refu
     space.advanceTo(20.0);
     CHECK(space.getTimeStep() == 0.25);
     errors[factor < 0.01 ? 1 : 0] = std::abs(energyOf(space) / start - 1);
+    single[factor < 0.01 ? 1 : 0] = space.individualSteps();
     CHECK_THAT(space.energyLedger().total(), WithinAbs(energyOf(space), 1e-15));
 
     const auto before = stateOf(space);
@@ -129,6 +131,11 @@ TEST_CASE("Hermite's steps follow timeStepFactor, and a user's own force is refu
   CHECK(errors[0] < 1e-3);
   CHECK(errors[0] / errors[1] > 64);
   CHECK(errors[0] / errors[1] < 1024);
+  // Both bodies of a pair have the same step, at most 0.25; steps go with the root of the factor.
+  CHECK(single[0] >= 2 * 80);
+  CHECK(single[0] % 2 == 0);
+  CHECK(double(single[1]) / double(single[0]) > 2.5);
+  CHECK(double(single[1]) / double(single[0]) < 6.4);
 }
 
 TEST_CASE("A change of G, of the field or of a body between two steps is felt by Hermite's method") {

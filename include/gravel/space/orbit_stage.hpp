@@ -83,6 +83,8 @@ class OrbitStage {
     return std::clamp<Scalar>(wanted, config.minTimeStep, config.timeStep);
   }
 
+  std::uint64_t individualSteps() const { return hermite_.bodySteps(); }
+
   void save(const Bodies& bodies, SnapshotWriter& out) const {
     const std::vector<Scalar> state = gaussRadau_.state();
     out.array("Gauss-Radau", state.data(), state.size());

@@ -126,6 +126,9 @@ class Space : public Settings<Scalar> {
   void advanceTo(Scalar time);
   Scalar time() const { return time_; }
   std::size_t steps() const { return steps_; }
+  /// Steps of single bodies inside those, each with one evaluation of its force, of the methods that give
+  /// every body a step of its own; 0 with others.
+  std::uint64_t individualSteps() const { return orbits_.individualSteps(); }
   Scalar getTimeStep() const { return dt_; }
   /// The next step; where steps adapt, also the longest one from now on.
   void setTimeStep(Scalar dt);
