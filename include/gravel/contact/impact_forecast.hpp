@@ -5,6 +5,7 @@
 
 #include <gravel/contact/contact.hpp>
 #include <gravel/contact/impact.hpp>
+#include <gravel/contact/swept_spheres.hpp>
 #include <gravel/core/parallel.hpp>
 
 #include <numeric>
@@ -69,13 +70,7 @@ class ImpactForecast {
     const std::size_t n = scene.walls.empty() ? 0 : nearWalls ? nearWalls->size() : scene.bodies.size();
     const std::size_t count = bodiesFrom + (n + chunk - 1) / chunk;
     parts_.resize(std::max(parts_.size(), count));
-    // No body gets further from where it starts than |v| h + |a| h^2/8.
-    ways_.resize(scene.bodies.size());
-    const S& h = scene.settings.h;
-    parallelFor(ways_.size(), chunk, [&](std::size_t k) {
-      const auto i = static_cast<std::uint32_t>(k);
-      ways_[k] = h * detail::safeNorm(scene.velocity(i)) + h * h * detail::safeNorm(scene.acceleration(i));
-    });
+    swept_.gather(scene, scene.settings.h);
     parallelForTasks(count, [&](std::size_t c) {
       parts_[c].clear();
       if (c < bodiesFrom) {
@@ -95,21 +90,13 @@ class ImpactForecast {
   }
 
   template <class Scene>
-  void predictPairs(const Scene& scene, std::span<const Pair> pairs, std::vector<Event>& out) const {
-    const S& h = scene.settings.h;
+  [[gnu::flatten]] void predictPairs(const Scene& scene, std::span<const Pair> pairs,
+                                     std::vector<Event>& out) const {
     auto next = scene.held.begin();
     bool placed = false;
+    Vector3<S> drift;
     for (const auto& [i, j] : pairs) {
-      const S reach = S(scene.bodies.radii()[i]) + S(scene.bodies.radii()[j]);
-      // The common case, before anything else is loaded: not near enough.
-      Vector3<S> drift = Vector3<S>::Zero();
-      Vector3<S> r = Vector3<S>(scene.bodies.positions()[j]) - Vector3<S>(scene.bodies.positions()[i]);
-      scene.domain.minimumImage(r, drift, scene.settings.time);
-      S far = reach + ways_[i] + ways_[j];
-      if (!(drift == Vector3<S>::Zero())) {
-        far += h * detail::safeNorm(drift);
-      }
-      if (r.squaredNorm() > far * far) {
+      if (!swept_.mayMeet(i, j, scene.domain, scene.settings.time, scene.settings.h, drift)) {
         continue;
       }
       const std::uint64_t key1 = scene.bodies.ids()[i];
@@ -125,6 +112,7 @@ class ImpactForecast {
           !detail::canTouch(scene.bodies, i, j)) {
         continue;
       }
+      const S reach = S(scene.bodies.radii()[i]) + S(scene.bodies.radii()[j]);
       if (const auto t = timeOfImpact<S>(flightOf(scene, i, j, drift), reach, S(0))) {
         out.push_back({*t, i, j, key1, key2});
       }
@@ -138,14 +126,13 @@ class ImpactForecast {
       return;
     }
     for (std::uint32_t w = 0; w < scene.walls.size(); ++w) {
-      const RelativeFlight<S> flight = flightOf(scene, i, scene.walls[w]);
-      const S most = radius + ways_[i] + scene.settings.h * detail::sumAbs(scene.walls[w].velocity);
-      if (scene.walls[w].normal.dot(flight.r) > most) {
+      const HalfSpace<S>& wall = scene.walls[w];
+      if (!swept_.mayMeet(i, wall, w)) {
         continue;
       }
-      if (const auto t = timeOfImpact<S>(flight, scene.walls[w].normal, radius, S(0))) {
+      if (const auto t = timeOfImpact<S>(flightOf(scene, i, wall), wall.normal, radius, S(0))) {
         const std::uint64_t key1 = scene.bodies.ids()[i];
-        const std::uint64_t key2 = boundaryKey(scene.walls[w].number);
+        const std::uint64_t key2 = boundaryKey(wall.number);
         const auto found = lowerBound(scene.held, key1, key2);
         if (found == scene.held.end() || keysOf(*found) != std::pair(key1, key2)) {
           out.push_back({*t, i, staticPartner, key1, key2, 0, 0, w});
@@ -302,7 +289,7 @@ class ImpactForecast {
   }
 
   std::vector<Event> queue_;
-  std::vector<S> ways_;  ///< [m] bound of the way of each body
+  SweptSpheres<S> swept_;
   std::vector<std::vector<Event>> parts_;
   std::vector<History> history_;
   std::vector<unsigned char> leans_;    ///< bodies with a contact that is held

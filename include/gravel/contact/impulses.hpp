@@ -18,25 +18,31 @@ namespace gravel {
 
 namespace detail {
 
-/// Largest |coefficient|; from comparisons alone, since a user's scalar need not have abs().
+/// |x|; from comparisons where it must be, since a user's scalar need not have abs().
+template <Real Scalar>
+[[gnu::always_inline]] inline Scalar sizeOf(const Scalar& x) {
+  if constexpr (std::is_floating_point_v<Scalar>) {
+    return std::abs(x);
+  } else {
+    return x < Scalar(0) ? Scalar(-x) : x;
+  }
+}
+
+/// Largest |coefficient|.
 template <Real Scalar>
 Scalar maxAbs(const Vector3<Scalar>& v) {
   Scalar largest(0);
   for (int c = 0; c < 3; ++c) {
-    const Scalar size = v[c] < Scalar(0) ? Scalar(-v[c]) : Scalar(v[c]);
+    const Scalar size = sizeOf<Scalar>(v[c]);
     largest = size <= largest ? largest : size;  // keeps a NaN
   }
   return largest;
 }
 
-/// |x| + |y| + |z|, at least |v|; from comparisons alone.
+/// |x| + |y| + |z|, at least |v|.
 template <Real Scalar>
-Scalar sumAbs(const Vector3<Scalar>& v) {
-  Scalar sum(0);
-  for (int c = 0; c < 3; ++c) {
-    sum += v[c] < Scalar(0) ? Scalar(-v[c]) : Scalar(v[c]);
-  }
-  return sum;
+[[gnu::always_inline]] inline Scalar sumAbs(const Vector3<Scalar>& v) {
+  return sizeOf<Scalar>(v[0]) + sizeOf<Scalar>(v[1]) + sizeOf<Scalar>(v[2]);
 }
 
 /// |v| of a vector whose square leaves the range of numbers.

@@ -85,13 +85,16 @@ class Domain {
   }
 
   /// The shortest image of a separation; r itself in an open domain. Odd in r.
-  Vector3<S> minimumImage(const Vector3<S>& r, const S& time) const {
+  [[gnu::always_inline]] Vector3<S> minimumImage(const Vector3<S>& r, const S& time) const {
     S boxes(0);
-    return shortest(r, time, boxes);
+    return isOpen() ? r : shortest(r, time, boxes);
   }
 
   /// The same, with the relative velocity v that belongs to that image.
   void minimumImage(Vector3<S>& r, Vector3<S>& v, const S& time) const {
+    if (isOpen()) {
+      return;
+    }
     S boxes(0);
     r = shortest(r, time, boxes);
     if (kind_ == DomainKind::ShearPeriodic) {
@@ -137,11 +140,8 @@ class Domain {
     return r - lengths_[axis] * detail::nearestInteger(S(r / lengths_[axis]));
   }
 
-  /// `boxes`: how many boxes were taken off in x.
+  /// In a domain that is not open. `boxes`: how many boxes were taken off in x.
   Vector3<S> shortest(const Vector3<S>& r, const S& time, S& boxes) const {
-    if (kind_ == DomainKind::Open) {
-      return r;
-    }
     const S home = detail::nearestInteger(S(r[0] / lengths_[0]));
     Vector3<S> best(r[0] - home * lengths_[0], nearest(r[1], 1), nearest(r[2], 2));
     boxes = home;

@@ -1,0 +1,72 @@
+#pragma once
+
+/// \file
+/// The first look at pairs that may touch in a step: how far each sphere gets.
+
+#include <gravel/contact/contact.hpp>
+#include <gravel/contact/contact_bodies.hpp>
+#include <gravel/contact/impulses.hpp>
+#include <gravel/core/parallel.hpp>
+#include <gravel/spatial/domain.hpp>
+
+#include <vector>
+
+namespace gravel::detail {
+
+/// Place and reach of every body, side by side: few of the pairs of neighbours get near each other in a step,
+/// and for the others nothing else is loaded.
+template <Real S>
+class SweptSpheres {
+ public:
+  /// No body gets further from where it starts than |v| h + |a| h^2/8. O(N).
+  /// \param scene `bodies`, their `course` with its mean velocity and acceleration, and `walls`
+  /// \param h [s]
+  template <class Scene>
+  void gather(const Scene& scene, const S& h) {
+    spheres_.resize(scene.bodies.size());
+    parallelFor(spheres_.size(), chunk, [&](std::size_t k) {
+      const auto i = static_cast<std::uint32_t>(k);
+      S way(0);
+      if (isMovable(scene.bodies, k)) {
+        way = h * safeNorm(Vector3<S>(scene.course.velocity(scene.bodies, i))) +
+              h * h * sumAbs(Vector3<S>(scene.course.acceleration(scene.bodies, i)));
+      }
+      spheres_[k] = {scene.bodies.positions()[i], S(scene.bodies.radii()[i]) + way};
+    });
+    wallWays_.clear();
+    for (const HalfSpace<S>& wall : scene.walls) {
+      wallWays_.push_back(h * sumAbs(wall.velocity));
+    }
+  }
+
+  /// \param drift out: [m s^-1] of the image of the second  \param time [s]  \param h [s]
+  [[gnu::always_inline]] bool mayMeet(std::uint32_t i, std::uint32_t j, const Domain<S>& domain,
+                                      const S& time, const S& h, Vector3<S>& drift) const {
+    Vector3<S> r = spheres_[j].x - spheres_[i].x;
+    S far = spheres_[i].reach + spheres_[j].reach;
+    drift = Vector3<S>::Zero();
+    if (!domain.isOpen()) {
+      domain.minimumImage(r, drift, time);
+      far += h * sumAbs(drift);
+    }
+    return !(r.squaredNorm() > far * far);
+  }
+
+  /// \param w number of the wall in the scene
+  bool mayMeet(std::uint32_t i, const HalfSpace<S>& wall, std::uint32_t w) const {
+    return !(wall.normal.dot(spheres_[i].x) - wall.offset > spheres_[i].reach + wallWays_[w]);
+  }
+
+ private:
+  static constexpr std::size_t chunk = 2048;
+
+  /// In double half a cache line.
+  struct alignas(alignof(S) > 32 ? alignof(S) : 32) Sphere {
+    Vector3<S> x;
+    S reach;
+  };
+  std::vector<Sphere> spheres_;
+  std::vector<S> wallWays_;  ///< [m]
+};
+
+}  // namespace gravel::detail
