@@ -12,6 +12,7 @@ struct Shape {
   double width = 4.2;  ///< in y, periodic
   int layers = 9;
   double timeStep = 0.1;  ///< in sqrt(diameter/g)
+  std::size_t parts = 1;  ///< of a step
 };
 
 struct Heap {
@@ -26,6 +27,7 @@ Heap heapAfterWalls(double friction, double rolling, std::uint64_t seed, const S
   config.coeffRestitution = 0.3;
   config.coeffFriction = config.coeffStaticFriction = friction;
   config.rollingFriction = rolling;
+  config.contactSubsteps = shape.parts;
   Space<double> space(config);
   space.setUniformField({0, 0, -1});
   space.setDomain(Domain<double>::periodic({1e3, shape.width, 1e3}));
@@ -123,4 +125,16 @@ TEST_CASE("Grains with friction stand at an angle where smooth ones run off") {
   CHECK(rough.angle > 20.5);
   CHECK(rough.angle < 40.5);
   CHECK(rough.angle > smooth.angle + 6.0);
+}
+
+// Four seeds rest at 24.4 to 30.0 degrees. Seen to fail: one part, or parts chosen by speeds alone, where the
+// rms speed is still 0.003 to 0.3 sqrt(g d).
+TEST_CASE("Parts chosen by motion let a heap rest at steps at which its flanks would creep") {
+  Shape coarse;
+  coarse.timeStep = 0.2;
+  coarse.parts = 0;
+  const Heap heap = heapAfterWalls(0.3, 0.0, 2, coarse);
+  CAPTURE(heap.angle, heap.speed);
+  CHECK(heap.speed < 1e-3);
+  CHECK(heap.angle > 19.0);
 }

@@ -223,6 +223,13 @@ TEST_CASE("Parts are chosen by how fast bodies that touch move past each other, 
   space.body(0).velocity() = Vec(1e5, 0, 0);
   advance(space, 1);
   CHECK(space.contactSubsteps() == 32);
+
+  // At rest, by the speed of a fall by the radius: 4 h sqrt(2 g / r) = 2.83.
+  space.body(0).velocity() = Vec(0, 0, 0);
+  space.body(0).angularVelocity() = Vec(0, 0, 0);
+  space.setTimeStep(0.5);
+  advance(space, 1);
+  CHECK(space.contactSubsteps() == 3);
 }
 
 TEST_CASE("Adaptive steps in parts are as much longer where only contacts ask for short ones") {

@@ -48,7 +48,8 @@ struct Space<Scalar, Layout>::Departure {
 };
 
 /// Into how many parts a step of length h is divided. Where motion chooses: no two bodies that touch move
-/// past each other by more than a quarter of the smaller radius in a part.
+/// past each other by more than a quarter of the smaller radius r in a part, nor would at the speed sqrt(2 a r)
+/// of a fall by r at their relative acceleration a: the flanks of heaps creep in longer steps.
 template <Real Scalar, class Layout>
 std::size_t Space<Scalar, Layout>::chooseParts(const Scalar& h) const {
   using std::sqrt;
@@ -59,13 +60,16 @@ std::size_t Space<Scalar, Layout>::chooseParts(const Scalar& h) const {
   for (const Contact<Scalar>& c : contacts()) {
     const bool boundary = c.second == staticPartner;
     Vector v = -Vector(bodies_.velocities()[c.first]) + c.drift;
+    Vector a = -Vector(bodies_.accelerations()[c.first]);
     Scalar r = bodies_.radii()[c.first];
     if (!boundary) {
       v += Vector(bodies_.velocities()[c.second]);
+      a += Vector(bodies_.accelerations()[c.second]);
       const Scalar r2 = bodies_.radii()[c.second];
       r = r2 > Scalar(0) && (r2 < r || !(r > Scalar(0))) ? r2 : r;
     }
     rate_sq = std::max<Scalar>(rate_sq, v.squaredNorm() / (r * r));
+    rate_sq = std::max<Scalar>(rate_sq, Scalar(2) * Scalar(sqrt(a.squaredNorm())) / r);
   }
   const Scalar wanted = Scalar(4) * h * sqrt(rate_sq);
   std::size_t parts = 1;
