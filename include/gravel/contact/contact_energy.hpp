@@ -11,6 +11,7 @@
 
 #include <gravel/contact/contact_problem.hpp>
 
+#include <algorithm>
 #include <array>
 #include <numeric>
 
@@ -29,6 +30,7 @@ class ContactEnergy {
               std::span<const Contact<S>> contacts, ContactReport<S>& report,
               std::span<ContactImpulse<S>> impulses) {
     terms_.resize(problem.rows.size());
+    ends_.resize(problem.rows.size());
     Sums sums = takeDown(problem, contacts, impulses);
     if (sums[3] > S(0) && guard(problem, colouring, contacts)) {
       sums = takeDown(problem, contacts, impulses);
@@ -45,9 +47,20 @@ class ContactEnergy {
   using Sums = Eigen::Array<S, 4, 1>;
   static constexpr std::size_t chunk = 512;
 
+  /// Slots of the movable bodies of a row that pushes.
+  struct Ends {
+    std::uint32_t first;
+    std::uint32_t second;
+  };
+  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+
+  /// Of an island.
+  struct Gain {
+    S sum = S(0);   ///< of energy
+    S size = S(0);  ///< of the terms that add up to it
+    bool isReal() const { return sum > S(8) * Eigen::NumTraits<S>::epsilon() * size; }  // no rounding
+  };
   struct Island {
-    S gain = S(0);    ///< of energy
-    S size = S(0);    ///< of the terms that add up to it
     S before = S(0);  ///< sum of J.u^-, of those that gain
     S beta = S(1);
     bool gains = false;
@@ -100,6 +113,7 @@ class ContactEnergy {
               detail::prefetch(impulses[later.contact]);
             }
             terms_[k] = S(0);
+            ends_[k] = {none, none};
             if (!(row.jn > S(0))) {
               impulses[row.contact] = {};
               impulses[row.contact].impact = row.impact;
@@ -114,6 +128,8 @@ class ContactEnergy {
             const auto [normal, across] =
                 power(problem, k, meanOf(problem, row.slot1), meanOf(problem, row.slot2), drift);
             terms_[k] = normal + across;
+            ends_[k] = {problem.bodies[row.slot1].inverseMass > S(0) ? row.slot1 : none,
+                        problem.bodies[row.slot2].inverseMass > S(0) ? row.slot2 : none};
             sums[0] -= normal;
             sums[1] -= across;
             if (problem.drifting) {
@@ -130,28 +146,31 @@ class ContactEnergy {
   bool guard(ContactProblem<S>& problem, const ContactColoring& colouring,
              std::span<const Contact<S>> contacts) {
     const std::size_t n = problem.bodies.size();
+    gains_.assign(n, Gain{});
     parent_.resize(n);
     std::iota(parent_.begin(), parent_.end(), 0U);
-    for (const Row& row : problem.rows) {
-      if (row.jn > S(0) && colouring.movable(row.slot1) && colouring.movable(row.slot2)) {
-        join(row.slot1, row.slot2);
+    for (const Ends& ends : ends_) {
+      if (ends.first != none && ends.second != none) {
+        join(ends.first, ends.second);
       }
     }
-    islands_.assign(n, Island{});
+    for (std::uint32_t& parent : parent_) {  // a parent comes before its children
+      parent = parent_[parent];
+    }
     for (std::size_t k = 0; k < terms_.size(); ++k) {
       if (terms_[k] != S(0)) {
-        Island& island = islands_[islandOf(problem.rows[k], colouring)];
-        island.gain += terms_[k];
-        island.size += terms_[k] < S(0) ? S(-terms_[k]) : terms_[k];
+        Gain& gain = gains_[parent_[ends_[k].first != none ? ends_[k].first : ends_[k].second]];
+        gain.sum += terms_[k];
+        gain.size += terms_[k] < S(0) ? S(-terms_[k]) : terms_[k];
       }
     }
-    const S rounding = S(8) * Eigen::NumTraits<S>::epsilon();
-    bool any = false;
-    for (Island& island : islands_) {
-      island.gains = island.gain > rounding * island.size;
-      any = any || island.gains;
-    }
+    const bool any =
+        std::any_of(gains_.begin(), gains_.end(), [](const Gain& gain) { return gain.isReal(); });
     if (any) {
+      islands_.assign(n, Island{});
+      for (std::size_t slot = 0; slot < n; ++slot) {
+        islands_[slot].gains = gains_[slot].isReal();
+      }
       for (std::size_t k = 0; k < problem.rows.size(); ++k) {
         const Row& row = problem.rows[k];
         Island& island = islands_[islandOf(row, colouring)];
@@ -161,10 +180,11 @@ class ContactEnergy {
           island.before += normal + across;
         }
       }
-      for (Island& island : islands_) {
+      for (std::size_t slot = 0; slot < n; ++slot) {
+        Island& island = islands_[slot];
         if (island.gains) {
           const S a = island.before;
-          const S b = island.gain - a;
+          const S b = gains_[slot].sum - a;
           island.beta = a < S(0) && b > S(0) ? std::min<S>(S(1), S(-a / b)) : S(0);
         }
       }
@@ -213,8 +233,10 @@ class ContactEnergy {
     parent_[std::max(i, j)] = std::min(i, j);  // slots are numbered by ids: the same whatever the indices
   }
 
-  std::vector<S> terms_;  ///< J.(u^- + u^+)/2 by row
+  std::vector<S> terms_;    ///< J.(u^- + u^+)/2 by row
+  std::vector<Ends> ends_;  ///< by row: what islands are found from, and nothing else of it
   std::vector<std::uint32_t> parent_;
+  std::vector<Gain> gains_;      ///< by the slot that stands for the island
   std::vector<Island> islands_;  ///< by the slot that stands for it
 };
 

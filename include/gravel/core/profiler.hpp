@@ -38,8 +38,8 @@ constexpr const char* phaseName(Phase phase) {
 /// Adds up wall-clock seconds, calls and skips by phase. Not shared between threads: a phase is entered by
 /// the thread that drives the step. Two readings of the clock a phase, about 50 ns; of steps shorter than 8
 /// us, which that would slow down by more than a hundredth, one in 16 is timed and counts for all, of those
-/// shorter than 0.5 us one in 256. So it is with the runs inside another phase in one step, beyond the first: some
-/// methods take thousands of steps of their own.
+/// shorter than 0.5 us one in 256. So it is with the runs inside another phase in one step, beyond the first:
+/// some methods take thousands of steps of their own.
 class Profiler {
  public:
   struct Entry {

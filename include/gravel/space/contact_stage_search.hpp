@@ -226,10 +226,10 @@ std::optional<std::span<const std::uint32_t>> ContactStage<Scalar, Layout>::near
 
 template <Real Scalar, class Layout>
 void ContactStage<Scalar, Layout>::rememberResting() {
-  resting_.clear();
-  for (const Contact<Scalar>& c : contacts_) {
-    resting_.push_back({c.key1, c.key2});
-  }
+  resting_.resize(contacts_.size());
+  parallelFor(contacts_.size(), 4096, [&](std::size_t k) {
+    resting_[k] = {contacts_[k].key1, contacts_[k].key2};
+  });
   const auto old = static_cast<std::ptrdiff_t>(resting_.size());
   for (const Impact<Scalar>& impact : impacts_.impacts()) {
     if (impact.rests) {

@@ -19,19 +19,15 @@ class StepRecord {
  public:
   /// A new step begins.
   void clear() {
-    keys_.clear();
-    sums_.clear();
+    holds_ = false;  // vectors keep their size: to fill them with zeros first takes as long as to copy
     impacts_.clear();
     parts_ = 1;
   }
 
   /// Adds the impulses of a solve, both in the order of keys. O(contacts).
   void add(std::span<const Contact<Scalar>> contacts, std::span<const ContactImpulse<Scalar>> impulses) {
-    keysBefore_.swap(keys_);
-    sumsBefore_.swap(sums_);
-    keys_.clear();
-    sums_.clear();
-    if (keysBefore_.empty()) {
+    if (!holds_) {
+      holds_ = true;
       const std::size_t count = std::min(contacts.size(), impulses.size());
       keys_.resize(count);
       sums_.resize(count);
@@ -41,6 +37,10 @@ class StepRecord {
       });
       return;
     }
+    keysBefore_.swap(keys_);
+    sumsBefore_.swap(sums_);
+    keys_.clear();
+    sums_.clear();
     std::size_t m = 0;
     for (std::size_t k = 0; k < contacts.size() && k < impulses.size(); ++k) {
       const ContactKeys keys{contacts[k].key1, contacts[k].key2};
@@ -63,14 +63,15 @@ class StepRecord {
   std::vector<ContactImpulse<Scalar>> sum(std::span<const Contact<Scalar>> contacts,
                                           std::span<const ContactImpulse<Scalar>> last) const {
     std::vector<ContactImpulse<Scalar>> sum;
+    const std::size_t count = holds_ ? keys_.size() : 0;
     std::size_t m = 0;
     for (std::size_t k = 0; k < contacts.size(); ++k) {
       sum.push_back(k < last.size() ? last[k] : ContactImpulse<Scalar>{});
       const ContactKeys keys{contacts[k].key1, contacts[k].key2};
-      while (m < keys_.size() && keys_[m] < keys) {
+      while (m < count && keys_[m] < keys) {
         ++m;
       }
-      if (m < keys_.size() && keys_[m] == keys) {
+      if (m < count && keys_[m] == keys) {
         join(sum.back(), sums_[m]);
       }
     }
@@ -109,6 +110,7 @@ class StepRecord {
   std::vector<ContactImpulse<Scalar>> sumsBefore_;
   std::vector<Impact<Scalar>> impacts_;
   std::size_t parts_ = 1;
+  bool holds_ = false;  ///< keys_ and sums_ are of this step
 };
 
 }  // namespace gravel

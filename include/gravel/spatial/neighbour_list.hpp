@@ -41,10 +41,15 @@ class NeighbourList {
     if (rebuilt_) {
       rebuild(positions, radii, ids, revision, domain, time, margin, travel);
     }
-    for (const std::uint32_t i : swift_) {
-      ++comparisons_;
-      detail::compare(i, positions, radii, ids, detail::wayOf<S>(travel, i), travel, S(room_ - skin_), free_,
-                      domain_, time_, extra_);
+    comparisons_ += swift_.size();
+    swiftPairs_.resize(std::max(swiftPairs_.size(), swift_.size()));
+    parallelForTasks(swift_.size(), [&](std::size_t k) {
+      swiftPairs_[k].clear();
+      detail::compare(swift_[k], positions, radii, ids, detail::wayOf<S>(travel, swift_[k]), travel,
+                      S(room_ - skin_), free_, domain_, time_, swiftPairs_[k]);
+    });
+    for (std::size_t k = 0; k < swift_.size(); ++k) {
+      extra_.insert(extra_.end(), swiftPairs_[k].begin(), swiftPairs_[k].end());
     }
     join(ids);
     return pairs();
@@ -276,9 +281,10 @@ class NeighbourList {
   std::vector<Vector3<S>> places_;  ///< at the last search
   std::vector<S> radii_;
   std::vector<Part> parts_;
-  std::vector<std::uint32_t> swift_;  ///< bodies that may leave their half of the skin
-  std::vector<Pair> extra_;           ///< their pairs
-  std::vector<Pair> joined_;          ///< pairs_ and extra_
+  std::vector<std::uint32_t> swift_;           ///< bodies that may leave their half of the skin
+  std::vector<std::vector<Pair>> swiftPairs_;  ///< of each of them
+  std::vector<Pair> extra_;                    ///< all of these, and more that were added
+  std::vector<Pair> joined_;                   ///< pairs_ and extra_
   std::vector<S> ways_;
   std::vector<std::uint32_t> order_;
   std::size_t comparisons_ = 0;  ///< of one body with all others since the last search
