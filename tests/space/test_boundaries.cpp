@@ -52,6 +52,21 @@ TEST_CASE("A piston of speed V turns -v into v + 2V for an elastic ball, and boo
   CHECK_THAT(space.energyLedger().total(), WithinRel(9.0, 1e-14));
 }
 
+// Seen to fail: a first look at walls that leaves out their own way.
+TEST_CASE("A wall that comes within a step strikes a ball at rest at its own time") {
+  SimulationConfig<double> config = plain(0.1);
+  config.coeffRestitution = 1.0;
+  Space<double> space(config);
+  const std::size_t piston = space.addPlane({0, 0, 1}, 0.0);
+  space.addBody(ball({0, 0, 1}, {0, 0, 0}, 0.5, 2.0));
+  space.setPlaneVelocity(piston, {0, 0, 8});
+  advance(space, 1);  // met after 0.5/8 of 0.1, then at 16
+  CHECK(space.contactReport().impacts == 1);
+  CHECK_THAT(space.body(0).velocity()[2], WithinRel(16.0, 1e-15));
+  CHECK_THAT(space.body(0).position()[2], WithinRel(1 + 16 * (0.1 - 0.0625), 1e-15));
+  CHECK_THAT(-space.energyLedger().work, WithinRel(256.0, 1e-14));
+}
+
 // In the frame of the belt: a ball that starts to slide at V rolls at 5/7 V from t = 2 V/(7 mu g) on (case B5
 // of the contact theory page); on the ground that is 2/7 V.
 TEST_CASE("A conveyor belt drags a ball from rest to rolling at 2/7 of its speed") {

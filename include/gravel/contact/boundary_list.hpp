@@ -7,6 +7,7 @@
 #include <gravel/contact/contact.hpp>
 #include <gravel/core/parallel.hpp>
 
+#include <algorithm>
 #include <span>
 
 namespace gravel {
@@ -22,13 +23,18 @@ class BoundaryList {
   ///        radii changed
   /// \param skin [m] by which gaps of bodies may shrink until then
   /// \param margin [m] of gaps, the same until then
+  /// \param h [s] for which boundaries move on at their velocities, and the list is to hold
   /// \return indices, increasing
   template <class Positions, class Radii>
   std::span<const std::uint32_t> update(const Positions& positions, const Radii& radii,
                                         std::span<const HalfSpace<S>> walls, bool stale, const S& skin,
-                                        const S& margin) {
-    if (stale || moved(walls)) {
-      search(positions, radii, walls, skin, margin);
+                                        const S& margin, const S& h = S(0)) {
+    ahead_.assign(walls.begin(), walls.end());
+    for (HalfSpace<S>& wall : ahead_) {
+      wall.offset += std::max<S>(S(0), wall.normal.dot(wall.velocity) * h);
+    }
+    if (stale || moved(ahead_)) {
+      search(positions, radii, ahead_, skin, margin);
     }
     return near_;
   }
@@ -88,7 +94,8 @@ class BoundaryList {
 
   std::vector<std::uint32_t> near_;
   std::vector<std::vector<std::uint32_t>> parts_;
-  std::vector<HalfSpace<S>> walls_;  ///< at the last search
+  std::vector<HalfSpace<S>> ahead_;  ///< where they will have come
+  std::vector<HalfSpace<S>> walls_;  ///< the same at the last search
   S wallSkin_ = S(0);
   std::size_t searches_ = 0;
 };

@@ -283,7 +283,8 @@ class ContactStage {
 
   void prepareSurfaces(const Config& config);
 
-  std::optional<std::span<const std::uint32_t>> nearBoundaries(const Bodies& bodies);
+  /// For the next h [s]. Nothing where all are to be looked at.
+  std::optional<std::span<const std::uint32_t>> nearBoundaries(const Bodies& bodies, const Scalar& h);
 
   /// Who was in contact at the step's start, or came to rest in it.
   void rememberResting();

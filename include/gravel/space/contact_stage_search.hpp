@@ -29,7 +29,7 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
   if (!goesOn) {
     const Profiler::Scope scope(profiler, Phase::NarrowPhase);
     narrow_.find(neighbours_.pairs(), bodies, domain, materials.entries(), walls_, settings, contacts_,
-                 nearBoundaries(bodies));
+                 nearBoundaries(bodies, Scalar(0)));
     return;
   }
   rememberResting();
@@ -41,7 +41,7 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
   }
   const Profiler::Scope scope(profiler, Phase::NarrowPhase);
   narrow_.find(neighbours_.pairs(), bodies, domain, materials.entries(), walls_, settings, contacts_,
-               nearBoundaries(bodies));
+               nearBoundaries(bodies, Scalar(0)));
 }
 
 template <Real Scalar, class Layout>
@@ -170,10 +170,10 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
           Scalar(time + impact.time), partner(impact.first, impact.key1, v1),
           partner(impact.second, impact.key2, v2), impact.normal, v_rel, material, impact.speed});
     };
-    blows = impacts_.resolve(bodies, near, domain, surfaces, walls, held, settings, nearBoundaries(bodies),
+    blows = impacts_.resolve(bodies, near, domain, surfaces, walls, held, settings, nearBoundaries(bodies, h),
                              course, decide);
   } else {
-    blows = impacts_.resolve(bodies, near, domain, surfaces, walls, held, settings, nearBoundaries(bodies),
+    blows = impacts_.resolve(bodies, near, domain, surfaces, walls, held, settings, nearBoundaries(bodies, h),
                              course);
   }
   neighbours_.add(impacts_.candidatesAdded(), bodies.ids());
@@ -216,12 +216,12 @@ void ContactStage<Scalar, Layout>::prepareSurfaces(const Config& config) {
 
 template <Real Scalar, class Layout>
 std::optional<std::span<const std::uint32_t>> ContactStage<Scalar, Layout>::nearBoundaries(
-    const Bodies& bodies) {
+    const Bodies& bodies, const Scalar& h) {
   if (!domain.isOpen() || neighbours_.strays()) {
     return std::nullopt;
   }
   return nearWalls_.update(bodies.positions(), bodies.radii(), walls_, neighbours_.rebuilt(),
-                           neighbours_.skin(), margin_);
+                           neighbours_.skin(), margin_, h);
 }
 
 template <Real Scalar, class Layout>
