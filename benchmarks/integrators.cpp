@@ -73,11 +73,11 @@ void run(const Problem& problem, IntegratorKind kind, double step, double factor
     size += x.squaredNorm();
   }
   const bool ownSteps = traitsOf(kind).forceEvaluations == 0;
-  const std::uint64_t calls = space.profiler().entry(Phase::Gravity).calls + space.individualSteps() / space.n();
+  const std::uint64_t calls =
+      space.profiler().entry(Phase::Gravity).calls + space.individualSteps() / space.n();
   std::printf("%s,%s%s,%.6g,%.6g,%llu,%.4g,%.4g\n", problem.name, traitsOf(kind).name,
               step > 0.0 || ownSteps ? "" : " adaptive", step > 0.0 ? step : factor, seconds,
-              static_cast<unsigned long long>(calls), energy,
-              std::sqrt(place / size));
+              static_cast<unsigned long long>(calls), energy, std::sqrt(place / size));
   std::fflush(stdout);
 }
 
