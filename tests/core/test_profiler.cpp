@@ -174,7 +174,7 @@ TEST_CASE("profiler: of short steps some are timed and count for all, long ones 
   CHECK(profiler.entry(Phase::Colouring).seconds >= 0.002);
 }
 
-// Seen to fail: a timed run that counts for one, and all of them left to the outer phase.
+// Seen to fail: a timed run that counts for one.
 TEST_CASE("profiler: of short runs inside another phase some are timed and count for all", "[profiler]") {
   Profiler profiler;
   const auto start = Clock::now();

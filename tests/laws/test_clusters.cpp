@@ -36,7 +36,7 @@ Space<double> cluster(std::uint64_t seed) {
 
 }  // namespace
 
-// Case A9, a = M = G = 1: W = -3 pi/32, 2 T/|W| = 1, half of the mass within 1.30477. From sphere to sphere
+// With a = M = G = 1: W = -3 pi/32, 2 T/|W| = 1, half of the mass within 1.30477. From sphere to sphere
 // of 4096 points W spreads by 1.7 %, T by 1.8 and the radius by 1.9: bounds are four times that, over the
 // root of
 // 16. Softening takes 1e-3 off W.
@@ -58,7 +58,7 @@ TEST_CASE("Plummer spheres have the energies and the half-mass radius of the mod
   CHECK_THAT(half, WithinRel(1.30477, 0.019));
 }
 
-// Case A9: the time in which a point at the rms speed of 0.543 crosses a is 1.84. The error is that of the
+// The time in which a point at the rms speed of 0.543 crosses a is 1.84. The error is that of the
 // step where stars pass each other within the softening of a/50. Seen to fail: steps of 1/16 (2.5e-3).
 TEST_CASE("A Plummer sphere keeps its energy to 1e-4, and its equilibrium, for ten crossing times") {
   Space<double> space = cluster(2);
@@ -79,7 +79,7 @@ TEST_CASE("A Plummer sphere keeps its energy to 1e-4, and its equilibrium, for t
   CHECK_THAT(halfMassRadius(space), WithinRel(1.30477, 0.08));
 }
 
-// Case A10: a homogeneous sphere at rest falls together in t_ff = (pi/2) sqrt(R^3 / (2 G M)), all shells
+// A homogeneous sphere at rest falls together in t_ff = (pi/2) sqrt(R^3 / (2 G M)), all shells
 // alike: r/R = cos^2 b, b + sin(2 b)/2 = t sqrt(2 G M / R^3). Points on a lattice are pulled by none of their
 // neighbours but at the surface, which is rough by a part in N^(2/3) = 258 of the mass: that in t_ff is
 // (2/3)/(1 - t/t_ff) times as much of the radius. Seen to fail: a softening of 0.1.
