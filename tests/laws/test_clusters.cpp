@@ -38,8 +38,7 @@ Space<double> cluster(std::uint64_t seed) {
 
 // With a = M = G = 1: W = -3 pi/32, 2 T/|W| = 1, half of the mass within 1.30477. From sphere to sphere
 // of 4096 points W spreads by 1.7 %, T by 1.8 and the radius by 1.9: bounds are four times that, over the
-// root of
-// 16. Softening takes 1e-3 off W.
+// root of 16. Softening takes 1e-3 off W.
 TEST_CASE("Plummer spheres have the energies and the half-mass radius of the model") {
   constexpr int samples = 16;
   double W = 0.0;
