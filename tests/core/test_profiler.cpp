@@ -191,7 +191,6 @@ TEST_CASE("profiler: of short runs inside another phase some are timed and count
   const double inner = profiler.entry(Phase::Gravity).seconds;
   const double outer = profiler.entry(Phase::Integration).seconds;
   CHECK(profiler.entry(Phase::Gravity).calls == 3200);
-  CHECK(profiler.entry(Phase::Gravity).untimed < 16);
   CHECK(inner > 3180 * 2e-6);
   CHECK(inner < 16 * passed);                   // one of them may have been interrupted
   CHECK(inner + outer >= 0.020 + 3200 * 2e-6);  // and what it is too much is taken from the outer one

@@ -81,7 +81,7 @@ TEST_CASE("A Plummer sphere keeps its energy to 1e-4, and its equilibrium, for t
 // A homogeneous sphere at rest falls together in t_ff = (pi/2) sqrt(R^3 / (2 G M)), all shells
 // alike: r/R = cos^2 b, b + sin(2 b)/2 = t sqrt(2 G M / R^3). Points on a lattice are pulled by none of their
 // neighbours but at the surface, which is rough by a part in N^(2/3) = 258 of the mass: that in t_ff is
-// (2/3)/(1 - t/t_ff) times as much of the radius. Seen to fail: a softening of 0.1.
+// (2/3)/(1 - t/t_ff) times as much of the radius; bounds at twice that. Seen to fail: a softening of 0.1.
 TEST_CASE("A cold sphere falls together in its free-fall time, all shells alike") {
   SimulationConfig<double> config = plain(1.0 / 256);
   config.G = 1.0;

@@ -63,7 +63,6 @@ class ContactEnergy {
   struct Island {
     S before = S(0);  ///< sum of J.u^-, of those that gain
     S beta = S(1);
-    bool gains = false;
   };
 
   /// J_n v_n, and J_t.v_t with what turns, at the velocities `b1` and `b2`.
@@ -168,21 +167,18 @@ class ContactEnergy {
         std::any_of(gains_.begin(), gains_.end(), [](const Gain& gain) { return gain.isReal(); });
     if (any) {
       islands_.assign(n, Island{});
-      for (std::size_t slot = 0; slot < n; ++slot) {
-        islands_[slot].gains = gains_[slot].isReal();
-      }
       for (std::size_t k = 0; k < problem.rows.size(); ++k) {
         const Row& row = problem.rows[k];
-        Island& island = islands_[islandOf(row, colouring)];
-        if (island.gains && row.jn > S(0)) {
+        const std::uint32_t island = islandOf(row, colouring);
+        if (gains_[island].isReal() && row.jn > S(0)) {
           const auto [normal, across] = power(problem, k, problem.initial[row.slot1],
                                               problem.initial[row.slot2], driftOf(problem, contacts, row));
-          island.before += normal + across;
+          islands_[island].before += normal + across;
         }
       }
       for (std::size_t slot = 0; slot < n; ++slot) {
         Island& island = islands_[slot];
-        if (island.gains) {
+        if (gains_[slot].isReal()) {
           const S a = island.before;
           const S b = gains_[slot].sum - a;
           island.beta = a < S(0) && b > S(0) ? std::min<S>(S(1), S(-a / b)) : S(0);

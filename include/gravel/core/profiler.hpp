@@ -48,11 +48,17 @@ class Profiler {
     std::uint64_t skips = 0;
     const char* reason = nullptr;  ///< why it was skipped the last time; a string literal
     const char* method = nullptr;  ///< how it was done the last time, where there is a choice; a literal
-    std::uint64_t every = 1;       ///< of so many runs inside another phase one is timed
-    std::uint64_t untimed = 0;     ///< such runs since
-    std::uint64_t step = 0;        ///< of the last one timed
   };
 
+ private:
+  /// Of the runs of a phase inside another one.
+  struct Sample {
+    std::uint64_t every = 1;    ///< of so many one is timed
+    std::uint64_t untimed = 0;  ///< since the last one that was
+    std::uint64_t step = 0;     ///< of that one
+  };
+
+ public:
   /// Times the rest of the enclosing scope. Where scopes nest, the outer one's clock stands still meanwhile,
   /// so that the seconds of all phases add up to the time passed.
   class Scope {
@@ -60,9 +66,10 @@ class Profiler {
     Scope(Profiler& profiler, Phase phase)
         : profiler_(profiler),
           entry_(profiler.entries_[static_cast<std::size_t>(phase)]),
+          sample_(profiler.samples_[static_cast<std::size_t>(phase)]),
           outer_(profiler.running_),
-          timed_(outer_ == nullptr || !profiler.timed_ || entry_.untimed + 1 >= entry_.every ||
-                 entry_.step != profiler.step_),
+          timed_(outer_ == nullptr || !profiler.timed_ || sample_.untimed + 1 >= sample_.every ||
+                 sample_.step != profiler.step_),
           before_(entry_.seconds) {
       if (timed_) {
         profiler_.change(&entry_);
@@ -73,24 +80,23 @@ class Profiler {
     ~Scope() {
       ++entry_.calls;
       if (!timed_) {
-        ++entry_.untimed;
+        ++sample_.untimed;
         return;
       }
       profiler_.change(outer_);
       if (outer_ != nullptr && outer_ != &entry_ && profiler_.timed_) {
         const double own = entry_.seconds - before_;
-        const double others = own * static_cast<double>(entry_.untimed);  // were booked on the outer one
+        const double others = own * static_cast<double>(sample_.untimed);  // were booked on the outer one
         entry_.seconds += others;
         outer_->seconds -= others;
-        entry_.every = sampleOf(own / profiler_.weight_);
-        entry_.untimed = 0;
-        entry_.step = profiler_.step_;
+        sample_ = {sampleOf(own / profiler_.weight_), 0, profiler_.step_};
       }
     }
 
    private:
     Profiler& profiler_;
     Entry& entry_;
+    Sample& sample_;
     Entry* outer_;
     bool timed_;
     double before_;
@@ -200,6 +206,7 @@ class Profiler {
   }
 
   std::array<Entry, phaseCount> entries_{};
+  std::array<Sample, phaseCount> samples_{};
   std::array<std::uint64_t, phaseCount> skipped_{};  // times in this step
   Entry* running_ = nullptr;
   Clock::time_point since_{};

@@ -48,8 +48,8 @@ struct Space<Scalar, Layout>::Departure {
 };
 
 /// Into how many parts a step of length h is divided. Where motion chooses: no two bodies that touch move
-/// past each other by more than a quarter of the smaller radius r in a part, nor would at the speed sqrt(2 a
-/// r) of a fall by r at their relative acceleration a: the flanks of heaps creep in longer steps.
+/// past each other by more than a quarter of the smaller radius r in a part, nor would at the speed of a fall
+/// by r at their relative acceleration, for the flanks of heaps creep in longer steps.
 template <Real Scalar, class Layout>
 std::size_t Space<Scalar, Layout>::chooseParts(const Scalar& h) const {
   using std::sqrt;
