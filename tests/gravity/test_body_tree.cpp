@@ -70,6 +70,47 @@ TEST_CASE("cells tile the bodies, in every scene, and leaves are small") {
   }
 }
 
+TEST_CASE("a tree made in the order of an earlier one is the tree made afresh, coincident bodies and all") {
+  const CounterRandom random(31);
+  for (const char* name : gravityScenes) {
+    auto points = gravityScene<double>(name, 3000);
+    Tree used = treeOf(points, 16);
+    for (std::size_t i = 0; i < 200; ++i) {  // pairs come to one place: only their numbers tell them apart
+      points.positions[i] = points.positions[i + 1000];
+    }
+    CAPTURE(name);
+    double extent = 0;
+    for (const Vector3<double>& x : points.positions) {
+      extent = std::max(extent, x.norm());
+    }
+    for (const double step : {0.0, 1e-6, 1e-3, 1.0}) {  // of the extent: at the last nothing is in order
+      for (std::size_t i = 400; i < 900; ++i) {
+        points.positions[i] += step * extent * random.direction(i);
+      }
+      const Tree fresh = treeOf(points, 16);
+      used.resize(points.size());
+      for (std::size_t row = 0; row < points.size(); ++row) {
+        const std::uint32_t i = used.body[row];
+        used.x[row] = points.positions[i][0];
+        used.y[row] = points.positions[i][1];
+        used.z[row] = points.positions[i][2];
+        used.m[row] = points.masses[i];
+      }
+      used.build(16);
+      checkShape(used, points);
+      REQUIRE(used.body == fresh.body);
+      REQUIRE(used.x == fresh.x);
+      REQUIRE(used.levels == fresh.levels);
+      REQUIRE(used.cells.size() == fresh.cells.size());
+      for (std::size_t c = 0; c < fresh.cells.size(); ++c) {
+        REQUIRE(used.cells[c].first == fresh.cells[c].first);
+        REQUIRE(used.cells[c].last == fresh.cells[c].last);
+        REQUIRE(used.cells[c].child == fresh.cells[c].child);
+      }
+    }
+  }
+}
+
 TEST_CASE("two clusters a million radii apart are each divided to the end") {
   auto points = randomMasses<double>(1000, 95, 1e-6);
   for (std::size_t i = 0; i < 500; ++i) {

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
 #include <vector>
 
 namespace gravel::detail {
@@ -114,15 +115,21 @@ struct BodyTree {
     return allSinks() || sinksBefore_[first] != sinksBefore_[last];
   }
 
+  /// Makes room for n rows, of which body[row] is to be brought: the order of the last tree of as many
+  /// bodies, which is nearly that of the next one, or that of the bodies.
   void resize(std::size_t n) {
     for (std::vector<S>* column : {&x, &y, &z, &m}) {
       column->assign(n + margin, S(0));
     }
-    body.resize(n);
+    if (body.size() != n) {
+      body.resize(n);
+      std::iota(body.begin(), body.end(), 0U);
+    }
   }
 
   /// Sorts the rows and builds cells of at most `leafSize` bodies, more only where bodies (nearly) coincide.
-  /// Places must be finite. O(N log N).
+  /// The same tree from any order of the rows. Places must be finite. O(N log N), the logarithm of those
+  /// alone whose order is another than in the last tree.
   void build(std::uint32_t leafSize) {
     cells.clear();
     levels.clear();
@@ -220,13 +227,19 @@ struct BodyTree {
                             mortonCell(z[i], low[2], edge)),
                   static_cast<std::uint32_t>(i)};
     });
-    parallelSort(keys_, first, last, keyScratch_, [](const Key& a, const Key& b) {
-      return a.key < b.key || (a.key == b.key && a.row < b.row);
+    parallelSort(keys_, first, last, keyScratch_, [&](const Key& a, const Key& b) {
+      return a.key < b.key || (a.key == b.key && body[a.row] < body[b.row]);
     });
-    for (std::vector<S>* column : {&x, &y, &z, &m}) {
-      permute(*column, scratch_, first, last);
+    bool moved = false;
+    for (std::uint32_t i = first; i < last && !moved; ++i) {
+      moved = keys_[i].row != i;
     }
-    permute(body, bodyScratch_, first, last);
+    if (moved) {
+      for (std::vector<S>* column : {&x, &y, &z, &m}) {
+        permute(*column, scratch_, first, last);
+      }
+      permute(body, bodyScratch_, first, last);
+    }
     return edge;
   }
 

@@ -169,13 +169,13 @@ class FastMultipole {
   void gather(const Positions& positions, const Masses& masses) {
     const std::size_t n = positions.size();
     tree_.resize(n);
-    parallelFor(n, 4096, [&](std::size_t i) {
+    parallelFor(n, 4096, [&](std::size_t row) {
+      const std::uint32_t i = tree_.body[row];
       const Vector3<S> x = images_.home(positions[i]) * units_.perLength();
-      tree_.x[i] = x[0];
-      tree_.y[i] = x[1];
-      tree_.z[i] = x[2];
-      tree_.m[i] = masses[i] * units_.perMass();
-      tree_.body[i] = static_cast<std::uint32_t>(i);
+      tree_.x[row] = x[0];
+      tree_.y[row] = x[1];
+      tree_.z[row] = x[2];
+      tree_.m[row] = masses[i] * units_.perMass();
     });
   }
 
