@@ -17,7 +17,7 @@ struct MultipolePlan {
 };
 
 inline constexpr std::array<MultipolePlan, 10> multipolePlans{{
-    {6e-3, 4, 0.33, 64, 2500},
+    {8e-3, 4, 0.38, 64, 2500},
     {2.5e-3, 5, 0.38, 64, 3100},
     {1e-3, 6, 0.38, 64, 3500},
     {3e-4, 6, 0.78, 64, 4900},
