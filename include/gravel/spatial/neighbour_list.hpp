@@ -140,33 +140,32 @@ class NeighbourList {
       return margin > S(0) ? "the margin grew or the flow used up the skin" : "the flow used up the skin";
     }
     const std::size_t n = places_.size();
+    const bool isOpen = domain.isOpen();
     parts_.resize((n + chunk - 1) / chunk);
     parallelForChunks<Share::Alike>(n, chunk, [&](std::size_t begin, std::size_t end) {
-      Part part;
-      part.swift.swap(parts_[begin / chunk].swift);
-      part.swift.clear();
-      for (std::size_t i = begin; i < end; ++i) {
-        part.otherRadius = part.otherRadius || !(radii[i] == radii_[i]);
-        Vector3<S> x = positions[i];
-        x[1] += flow_ * x[0];
-        S d_sq = domain.minimumImage(x - places_[i], time_).squaredNorm();
-        if constexpr (!std::is_same_v<Travel, AtRest>) {
-          x = Vector3<S>(positions[i]) + Vector3<S>(travel(i));
-          x[1] += flow_ * x[0];
-          d_sq = std::max<S>(d_sq, domain.minimumImage(x - places_[i], time_).squaredNorm());
+      const auto wayFrom = [&](std::size_t i, const Vector3<S>& x) {
+        Vector3<S> d = x - places_[i];
+        if (!isOpen) {
+          d[1] += flow_ * x[0];
+          d = domain.minimumImage(d, time_);
         }
-        if (!(S(4) * d_sq <= free_ * free_)) {  // a NaN too, for the search to refuse
-          part.swift.push_back(static_cast<std::uint32_t>(i));
-          part.lost = part.lost || !isFinite(d_sq);
-          part.most_sq = std::max<S>(part.most_sq, d_sq);
-        } else if (d_sq > part.moved_sq) {
-          part.moved_sq = d_sq;
+        return d.squaredNorm();
+      };
+      const auto farthest = [&](std::size_t i) {
+        const Vector3<S> x = positions[i];
+        const S d_sq = wayFrom(i, x);
+        if constexpr (std::is_same_v<Travel, AtRest>) {
+          return d_sq;
+        } else {
+          const S end_sq = wayFrom(i, Vector3<S>(x + Vector3<S>(travel(i))));
+          return end_sq > d_sq || !(end_sq == end_sq) ? end_sq : d_sq;
         }
-      }
-      parts_[begin / chunk] = std::move(part);
+      };
+      const auto same = [&](std::size_t i) { return radii[i] == radii_[i]; };
+      parts_[begin / chunk].look(begin, end, S(free_ * free_ / S(4)), farthest, same);
     });
     moved_sq_ = S(0);
-    for (const Part& part : parts_) {
+    for (const detail::Wandering<S>& part : parts_) {
       if (part.otherRadius) {
         return "a radius changed";
       }
@@ -268,19 +267,11 @@ class NeighbourList {
   static constexpr std::size_t mostComparisons = 128;
   static std::size_t mostSwift(std::size_t n) { return std::min<std::size_t>(8, n / 64); }
 
-  struct Part {
-    S moved_sq = S(0);
-    S most_sq = S(0);  ///< of the swift
-    bool otherRadius = false;
-    bool lost = false;
-    std::vector<std::uint32_t> swift;
-  };
-
   BroadPhase<S> search_;
   std::vector<Pair> pairs_;
   std::vector<Vector3<S>> places_;  ///< at the last search
   std::vector<S> radii_;
-  std::vector<Part> parts_;
+  std::vector<detail::Wandering<S>> parts_;
   std::vector<std::uint32_t> swift_;           ///< bodies that may leave their half of the skin
   std::vector<std::vector<Pair>> swiftPairs_;  ///< of each of them
   std::vector<Pair> extra_;                    ///< all of these, and more that were added

@@ -13,6 +13,50 @@ struct AtRest {};
 
 namespace detail {
 
+/// How far some bodies got from where a search saw them, and which of them too far.
+template <Real S>
+struct Wandering {
+  S moved_sq = S(0);  ///< most of those that did not get too far
+  S most_sq = S(0);   ///< most of the others, the swift
+  bool otherRadius = false;
+  bool lost = false;  ///< one is at no finite place
+  std::vector<std::uint32_t> swift;
+
+  /// For bodies [begin, end). \param farthest(i) squared distance, NaN where a place is  \param same(i)
+  /// whether the radius is what it was
+  template <class Farthest, class Same>
+  void look(std::size_t begin, std::size_t end, const S& within_sq, Farthest&& farthest, Same&& same) {
+    moved_sq = most_sq = S(0);
+    lost = false;
+    swift.clear();
+    // Mostly all are near: first a loop without branches.
+    bool near = true;
+    bool alike = true;
+    S most(0);
+    for (std::size_t i = begin; i < end; ++i) {
+      const S d_sq = farthest(i);
+      near = near & (d_sq <= within_sq);
+      alike = alike & same(i);
+      most = d_sq > most ? d_sq : most;
+    }
+    otherRadius = !alike;
+    if (near) {
+      moved_sq = most;
+      return;
+    }
+    for (std::size_t i = begin; i < end; ++i) {
+      const S d_sq = farthest(i);
+      if (d_sq <= within_sq) {
+        moved_sq = std::max<S>(moved_sq, d_sq);
+      } else {
+        swift.push_back(static_cast<std::uint32_t>(i));
+        lost = lost || !isFinite(d_sq);
+        most_sq = std::max<S>(most_sq, d_sq);
+      }
+    }
+  }
+};
+
 /// [1] Of the scalar, or of double where the scalar does not say.
 template <Real S>
 S roundoff() {
