@@ -5,6 +5,7 @@
 
 #include "scene.hpp"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 
@@ -18,6 +19,9 @@ struct History {
   double peakMotion = 0.0;  ///< most kinetic + rotational energy seen
   std::size_t mostContacts = 0;
   std::size_t rows = 0;
+  std::size_t steps = 0;  ///< that were counted
+  std::size_t parts = 0;  ///< of these, each with its own contacts
+  std::size_t mostParts = 0;
 
   /// How far the ledger's total is from its start, over the energy in play.
   double drift() const { return inPlay > 0.0 ? (last.total() - first.total()) / inPlay : 0.0; }
@@ -29,6 +33,12 @@ class Diagnostics {
   /// \throws std::runtime_error if the file cannot be written
   explicit Diagnostics(const std::filesystem::path& path);
   void record(const Space<double>& space);
+  /// A step is over.
+  void count(const Space<double>& space) {
+    ++history_.steps;
+    history_.parts += space.contactSubsteps();
+    history_.mostParts = std::max(history_.mostParts, space.contactSubsteps());
+  }
   const History& history() const { return history_; }
 
  private:

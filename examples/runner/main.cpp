@@ -162,6 +162,7 @@ int run(const Options& options) {
     } else {
       space.advanceTo(scene.duration);
     }
+    diagnostics.count(space);
     observe();
   }
   if (stopRequested != 0) {

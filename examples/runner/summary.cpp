@@ -133,6 +133,11 @@ std::string summary(const Scene& scene, const Space<double>& space, const Histor
                  scene.units.mass.c_str(), sceneTime(space.time(), scene.units).c_str(),
                  counted(space.steps(), "step", "steps").c_str(),
                  space.config().adaptiveTimeStep ? "changing length" : "equal length");
+  if (history.mostParts > 1) {
+    text +=
+        format("Contacts were solved in %.3g parts of a step, %zu at most.\n",
+               static_cast<double>(history.parts) / static_cast<double>(history.steps), history.mostParts);
+  }
   if (space.n() > 0) {
     addContacts(text, scene, space, history);
     addGravity(text, scene, space, history);
