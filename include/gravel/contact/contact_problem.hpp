@@ -46,7 +46,10 @@ class ContactProblem {
     const int massExponent = massExponent_;
     gatherBodies(source, colouring);
     fresh = fresh || massExponent != massExponent_ || rows.size() != contacts.size();
+    last_ = last;
+    ratio_ = ratio;
     rows.resize(contacts.size());
+    gaps_.resize(contacts.size());
     turning.resize(kinds.turn ? contacts.size() : 0);
     slipTargets.assign(friction && (kinds.drift || kinds.spring) ? rows.size() : 0, Vector3<S>::Zero());
     const auto take = [&](std::size_t k, Largest& most) {
@@ -54,14 +57,19 @@ class ContactProblem {
       const Contact<S>& contact = contacts[place.contact];
       if (k + lookAhead < contacts.size()) {
         const ContactColoring::Row& later = colouring.rows()[k + lookAhead];
-        detail::prefetch(contacts[later.contact]);
+        if (fresh || drifting) {
+          detail::prefetch(contacts[later.contact]);
+        }
         detail::prefetch(last[later.contact]);
         fetch(later.slot1, later.slot2);
       }
       if (fresh) {
         fill(rows[k], contact, place, source);
+        gaps_[k] = contact.gap;
         if (!turning.empty()) {
-          fill(turning[k], contact, place, source);
+          const S r2 = contact.second == staticPartner ? S(0) : S(source.radii()[contact.second]);
+          turning[k] = detail::turningRow<S>(contact.material, source.radii()[contact.first], r2,
+                                             bodies[place.slot1].spin, bodies[place.slot2].spin);
         }
       }
       const ContactImpulse<S>& before = last[place.contact];
@@ -72,10 +80,7 @@ class ContactProblem {
     Largest most = detail::sumOverRows(0, colouring.loneCount(), Largest{}, take);
     most += detail::sumOverColours(colouring, Largest{}, [&](std::size_t k, Largest& part) {
       take(k, part);
-      const ContactImpulse<S>& before = last[rows[k].contact];
-      if (ratio > S(0) && before.normal > S(0)) {
-        guess(k, before, ratio);
-      }
+      guess(k);
     });
     largestApproach = most.value;
     active = largestApproach > S(0);
@@ -105,6 +110,15 @@ class ContactProblem {
       detail::prefetch(bodies[slot]);
       detail::prefetch(initial[slot]);
     }
+  }
+
+  /// What sweeps begin with in a row: the impulse of the last step again.
+  detail::RowGuess<S> firstGuess(std::size_t k) const {
+    const ContactImpulse<S>& before = last_[rows[k].contact];
+    return ratio_ > S(0) && before.normal > S(0)
+               ? detail::guessOf(rows[k], impulseIn(S(ratio_ * before.normal)),
+                                 impulseIn(Vector3<S>(ratio_ * before.tangential)))
+               : detail::RowGuess<S>{};
   }
 
   /// Impulses and energies in SI units from those of the scaled problem, and back.
@@ -194,26 +208,12 @@ class ContactProblem {
     row.contact = place.contact;
     row.c1 = ratio(c.arm1, source.radii()[c.first]);
     row.c2 = c.second == staticPartner ? S(0) : ratio(c.arm2, source.radii()[c.second]);
-    row.normalMass = inverse(b1.inverseMass + b2.inverseMass);
+    row.normalMass = detail::inverse<S>(b1.inverseMass + b2.inverseMass);
     const S mobility =
         b1.inverseMass + b2.inverseMass + row.c1 * row.c1 * b1.spin + row.c2 * row.c2 * b2.spin;
-    row.tangentialMass = inverse(mobility);
+    row.tangentialMass = detail::inverse<S>(mobility);
     row.stick = c.material.staticFriction * mobility;
     row.slide = c.material.kineticFriction * mobility;
-    row.gap = c.gap;
-  }
-
-  template <class B>
-  void fill(detail::TurningRow<S>& row, const Contact<S>& c, const ContactColoring::Row& place,
-            const B& source) const {
-    const S r1 = source.radii()[c.first];
-    const S r2 = c.second == staticPartner ? S(0) : S(source.radii()[c.second]);
-    row.q1 = r2 > S(0) ? S(r2 / (r1 + r2)) : S(1);
-    row.q2 = r2 > S(0) ? S(r1 / (r1 + r2)) : S(0);
-    row.mass =
-        inverse(row.q1 * row.q1 * bodies[place.slot1].spin + row.q2 * row.q2 * bodies[place.slot2].spin);
-    row.rolling = c.material.rollingFriction;
-    row.spinning = c.material.spinningFriction;
   }
 
   /// What the present velocities ask for.
@@ -224,8 +224,6 @@ class ContactProblem {
     row.sliding = false;
     row.jn = S(0);
     row.u = Vector3<S>::Zero();
-    row.stepN = S(0);
-    row.stepU = Vector3<S>::Zero();
     if (!turning.empty()) {
       turning[k].l = turning[k].step = Vector3<S>::Zero();
     }
@@ -237,8 +235,8 @@ class ContactProblem {
     const S drift_n = row.n.dot(drift);
     const S v_n = detail::normalVelocity(row, b1, b2) + drift_n;
     const S speed = v_n < S(0) ? S(-v_n) : v_n;
-    const S allowed =
-        row.gap > S(0) ? (dt > S(0) ? speedIn(S(row.gap / dt)) : Eigen::NumTraits<S>::highest()) : S(0);
+    const S gap = gaps_[k];
+    const S allowed = gap > S(0) ? (dt > S(0) ? speedIn(S(gap / dt)) : Eigen::NumTraits<S>::highest()) : S(0);
     // In a heap at rest relative accelerations vanish, and what a step brings is passed on by the others:
     // there no more than a fall of the step is rest.
     S pull = loaded ? S(fall1.size + fall2.size) : S(0);
@@ -269,22 +267,19 @@ class ContactProblem {
     }
   }
 
-  /// The impulse of the last step again.
-  [[gnu::flatten]] void guess(std::size_t k, const ContactImpulse<S>& before, const S& ratio) {
+  /// Begins with the first guess of a row, if there is one.
+  [[gnu::flatten]] void guess(std::size_t k) {
+    const detail::RowGuess<S> first = firstGuess(k);
+    if (!(first.jn > S(0))) {
+      return;
+    }
     Row& row = rows[k];
     Body& b1 = bodies[row.slot1];
     Body& b2 = bodies[row.slot2];
-    row.jn = impulseIn(S(ratio * before.normal));
+    row.jn = first.jn;
     Vector3<S> j = row.jn * row.n;
     if (row.stick > S(0)) {
-      using std::sqrt;
-      const Vector3<S> jt = impulseIn(Vector3<S>(ratio * before.tangential));
-      row.u = (jt - row.n.dot(jt) * row.n) / row.tangentialMass;
-      const S size_sq = row.u.squaredNorm();
-      const S stick = row.stick * row.jn;
-      if (size_sq > stick * stick) {
-        row.u *= row.slide * row.jn / S(sqrt(size_sq));
-      }
+      row.u = first.u;
       const Vector3<S> across = row.tangentialMass * row.u;
       j += across;
       detail::twist(row, b1, b2, across);
@@ -292,16 +287,18 @@ class ContactProblem {
     detail::push(b1, b2, j);
     if (!turning.empty()) {
       detail::TurningRow<S>& row2 = turning[k];
-      row2.l = resistTurning<S>(impulseIn(Vector3<S>(ratio * before.turning)), row.n, row.jn, row2.rolling,
-                                row2.spinning);
+      row2.l = resistTurning<S>(impulseIn(Vector3<S>(ratio_ * last_[row.contact].turning)), row.n, row.jn,
+                                row2.rolling, row2.spinning);
       detail::turn(row2, b1, b2, row2.l);
     }
   }
 
-  static S inverse(const S& x) { return x > S(0) ? S(1) / x : S(0); }
   static S ratio(const S& arm, const S& radius) { return radius > S(0) ? arm / radius : S(0); }
 
   std::vector<Fall> falls_;  ///< by slot
+  std::vector<S> gaps_;      ///< [m] by row: sweeps do not look at them
+  std::span<const ContactImpulse<S>> last_;
+  S ratio_ = S(0);
   int speedExponent_ = 0;
   int massExponent_ = 0;
 };

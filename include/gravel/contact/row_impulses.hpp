@@ -31,8 +31,9 @@ struct RowImpulses {
     }
   };
 
-  /// Friction of a row for its normal impulse. \return the change of the tangential impulse
-  [[gnu::always_inline]] static inline Vector3<S> rubbed(Row& row, const Vector3<S>& slip,
+  /// Friction of a row for its normal impulse. \param step of u, to which its change is added
+  /// \return the change of the tangential impulse
+  [[gnu::always_inline]] static inline Vector3<S> rubbed(Row& row, const Vector3<S>& slip, Vector3<S>& step,
                                                          Progress& progress) {
     using std::sqrt;
     Vector3<S> u = row.u - slip;
@@ -47,9 +48,9 @@ struct RowImpulses {
     row.sliding = slides;
     const Vector3<S> du = u - row.u;
     row.u = u;
-    row.stepU += du;
+    step += du;
     const S change_sq = du.squaredNorm();
-    progress += {change_sq, row.tangentialMass * du.dot(row.stepU), row.tangentialMass * change_sq};
+    progress += {change_sq, row.tangentialMass * du.dot(step), row.tangentialMass * change_sq};
     return row.tangentialMass * du;
   }
 
@@ -60,7 +61,8 @@ struct RowImpulses {
       slip -= problem.slipTargets[k];
     }
     Progress progress;
-    const Vector3<S> dj = rubbed(row, slip, progress);
+    Vector3<S> step = Vector3<S>::Zero();
+    const Vector3<S> dj = rubbed(row, slip, step, progress);
     push(b1, b2, dj);
     twist(row, b1, b2, dj);
     return progress;

@@ -80,10 +80,18 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       local = report.iterations == 1 ? now.changed < count / few : local;
       if (local) {
         local = report.looks < 2 * problem.rows.size();
-        if (!local && accelerate) {
-          begin(problem);
+        if (!local) {
+          steps_.assign(problem.rows.size(), RowStep{});
+          if (accelerate) {
+            begin(problem);
+          }
         }
-      } else if (accelerate) {
+        continue;
+      }
+      if (report.iterations == 1) {
+        findSteps(problem, colouring.loneCount());
+      }
+      if (accelerate) {
         const S old = momentum.beta;
         if (momentum.stalls(now.along, now.size, problem.friction, report.iterations)) {
           return report;
@@ -104,6 +112,22 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     Vector3<S> dv = Vector3<S>::Zero();
     Vector3<S> ds = Vector3<S>::Zero();
   };
+
+  /// Of a row's jn and u, from sweep to sweep.
+  struct RowStep {
+    S n = S(0);
+    Vector3<S> u = Vector3<S>::Zero();
+  };
+
+  /// Steps of the first sweep: kept by none that stops there, or goes on with a few rows.
+  void findSteps(const ContactProblem<S>& problem, std::size_t loneCount) {
+    steps_.resize(problem.rows.size());
+    parallelFor(problem.rows.size() - loneCount, chunk, [&](std::size_t i) {
+      const std::size_t k = loneCount + i;
+      const auto first = problem.firstGuess(k);
+      steps_[k] = {S(problem.rows[k].jn - first.jn), Vector3<S>(problem.rows[k].u - first.u)};
+    });
+  }
 
   void begin(const ContactProblem<S>& problem) {
     bodySteps_.resize(problem.bodies.size());
@@ -202,16 +226,19 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     Body& b2 = problem.bodies[row.slot2];
     const Vector3<S> v_rel = b2.v - b1.v;
     const S v_n = row.n.dot(v_rel);
-    row.stepN = Watched ? S(0) : S(row.stepN * beta);
-    const S jn = row.jn + row.stepN;
+    RowStep step;
+    if constexpr (!Watched) {
+      step = {S(steps_[k].n * beta), Vector3<S>(steps_[k].u * beta)};
+    }
+    const S jn = row.jn + step.n;
     const S next = jn + row.normalMass * (row.target - v_n);
     row.jn = next > S(0) ? next : S(0);
     const S dj = row.jn - jn;
-    row.stepN += dj;
+    step.n += dj;
     Progress progress;
     const S change = dj * (b1.inverseMass + b2.inverseMass);
     progress.change_sq = change * change;
-    progress.along = row.stepN * change;
+    progress.along = step.n * change;
     progress.size = dj * change;
     Vector3<S> j = dj * row.n;
     S push_t(0);  // |its part across n|, or more
@@ -219,18 +246,15 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     S turn2(0);
     if constexpr (Friction) {
       if (row.stick > S(0)) {
-        if constexpr (Watched) {
-          row.stepU.setZero();
-        } else {
-          row.stepU *= beta;
-          row.u += row.stepU;
+        if constexpr (!Watched) {
+          row.u += step.u;
         }
         if (row.jn > S(0) || row.u != Vector3<S>::Zero()) {
           Vector3<S> slip = v_rel - v_n * row.n - Vector3<S>(row.c1 * b1.s + row.c2 * b2.s).cross(row.n);
           if (!problem.slipTargets.empty()) {
             slip -= problem.slipTargets[k];
           }
-          const Vector3<S> dt = rubbed(row, slip, progress);
+          const Vector3<S> dt = rubbed(row, slip, step.u, progress);
           j += dt;
           detail::twist(row, b1, b2, dt);
           if constexpr (Watched) {
@@ -258,7 +282,9 @@ class SequentialImpulses : private detail::RowImpulses<S> {
         progress += resisted;
       }
     }
-    if constexpr (Watched) {
+    if constexpr (!Watched) {
+      steps_[k] = step;
+    } else {
       const S push = (dj < S(0) ? S(-dj) : dj) + push_t;
       if (b1.inverseMass > S(0)) {
         watch_.move(row.slot1, b1.inverseMass * push + turn1);
@@ -273,6 +299,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
   }
 
   std::vector<BodyStep> bodySteps_;
+  std::vector<RowStep> steps_;  ///< of sweeps over all rows after the first
   detail::RowWatch<S> watch_;
 };
 

@@ -45,8 +45,9 @@ struct ProblemScales {
   }
 };
 
+/// In double two cache lines.
 template <Real S>
-struct SolverRow {
+struct alignas(alignof(S) > 64 ? alignof(S) : 64) SolverRow {
   Vector3<S> n;
   S c1;  ///< arm / radius
   S c2;
@@ -54,12 +55,9 @@ struct SolverRow {
   S tangentialMass;  ///< 1/(1/m1 (1 + c1^2/k1) + 1/m2 (1 + c2^2/k2))
   S stick;   ///< static friction over tangentialMass: the most that `u` may be, over jn, where it sticks
   S slide;   ///< kinetic friction over tangentialMass
-  S gap;     ///< [m]
   S target;  ///< v_n after the blow is at least this
   S jn;
   Vector3<S> u;  ///< tangential impulse over tangentialMass: the change of slip that it makes
-  S stepN;       ///< of jn and u, from sweep to sweep
-  Vector3<S> stepU;
   std::uint32_t slot1;
   std::uint32_t slot2;
   std::uint32_t contact;
@@ -81,6 +79,48 @@ struct TurningRow {
 
   Vector3<S> rho(const SolverBody<S>& b1, const SolverBody<S>& b2) const { return q2 * b2.s - q1 * b1.s; }
 };
+
+template <Real S>
+S inverse(const S& x) {
+  return x > S(0) ? S(1) / x : S(0);
+}
+
+/// \param r2 0 for a boundary
+template <Real S>
+TurningRow<S> turningRow(const Material<S>& material, const S& r1, const S& r2, const S& spin1,
+                         const S& spin2) {
+  TurningRow<S> row;
+  row.q1 = r2 > S(0) ? S(r2 / (r1 + r2)) : S(1);
+  row.q2 = r2 > S(0) ? S(r1 / (r1 + r2)) : S(0);
+  row.mass = inverse<S>(row.q1 * row.q1 * spin1 + row.q2 * row.q2 * spin2);
+  row.rolling = material.rollingFriction;
+  row.spinning = material.spinningFriction;
+  return row;
+}
+
+/// `jn` and `u` of a row.
+template <Real S>
+struct RowGuess {
+  S jn = S(0);
+  Vector3<S> u = Vector3<S>::Zero();
+};
+
+/// The impulse jn n + jt, made to lie in Coulomb's cone of a row.
+template <Real S>
+[[gnu::always_inline]] inline RowGuess<S> guessOf(const SolverRow<S>& row, const S& jn,
+                                                  const Vector3<S>& jt) {
+  using std::sqrt;
+  RowGuess<S> guess{jn};
+  if (row.stick > S(0)) {
+    guess.u = (jt - row.n.dot(jt) * row.n) / row.tangentialMass;
+    const S size_sq = guess.u.squaredNorm();
+    const S stick = row.stick * jn;
+    if (size_sq > stick * stick) {
+      guess.u *= row.slide * jn / S(sqrt(size_sq));
+    }
+  }
+  return guess;
+}
 
 template <Real S>
 [[gnu::always_inline]] inline S normalVelocity(const SolverRow<S>& row, const SolverBody<S>& b1,
