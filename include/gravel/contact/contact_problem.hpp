@@ -73,9 +73,7 @@ class ContactProblem {
         }
       }
       const ContactImpulse<S>& before = last[place.contact];
-      aim(k, contact, dt, settings, before.normal > S(0));
-      most += Largest{rows[k].target -
-                      detail::normalVelocity(rows[k], initial[place.slot1], initial[place.slot2])};
+      most += Largest{aim(k, contact, dt, settings, before.normal > S(0))};
     };
     Largest most = detail::sumOverRows(0, colouring.loneCount(), Largest{}, take);
     most += detail::sumOverColours(colouring, Largest{}, [&](std::size_t k, Largest& part) {
@@ -216,8 +214,8 @@ class ContactProblem {
     row.slide = c.material.kineticFriction * mobility;
   }
 
-  /// What the present velocities ask for.
-  [[gnu::flatten]] void aim(std::size_t k, const Contact<S>& c, const S& dt,
+  /// What the present velocities ask for. \return change of the normal velocity
+  [[gnu::flatten]] S aim(std::size_t k, const Contact<S>& c, const S& dt,
                             const ContactSettings<S>& settings, bool loaded) {
     Row& row = rows[k];
     row.slides = 0;
@@ -233,7 +231,8 @@ class ContactProblem {
     const Fall& fall2 = falls_[row.slot2];
     const Vector3<S> drift = drifting ? speedIn(c.drift) : Vector3<S>(Vector3<S>::Zero());
     const S drift_n = row.n.dot(drift);
-    const S v_n = detail::normalVelocity(row, b1, b2) + drift_n;
+    const S present = detail::normalVelocity(row, b1, b2);
+    const S v_n = present + drift_n;
     const S speed = v_n < S(0) ? S(-v_n) : v_n;
     const S gap = gaps_[k];
     const S allowed = gap > S(0) ? (dt > S(0) ? speedIn(S(gap / dt)) : Eigen::NumTraits<S>::highest()) : S(0);
@@ -265,6 +264,7 @@ class ContactProblem {
         slipTarget -= c.material.tangentialRestitution * slip;
       }
     }
+    return row.target - present;
   }
 
   /// Begins with the first guess of a row, if there is one.

@@ -5,6 +5,7 @@
 
 #include <gravel/contact/contact_coloring.hpp>
 #include <gravel/contact/row_watch.hpp>
+#include <gravel/contact/solver_rows.hpp>
 #include <gravel/core/parallel.hpp>
 
 namespace gravel {
@@ -71,12 +72,19 @@ class PositionalCorrection {
     if (!(all.overlap * settings.factor > right / S(100))) {
       return report;
     }
-    prepare(contacts, colouring, bodies, settings);
+    takeUp(colouring, bodies);
+    rows_.resize(contacts.size());
     const S enough = std::max<S>(settings.tolerance * all.overlap, right);
     watch_.begin(shifts_.size(), rows_.size(), S(enough / S(2)));
     do {
       // Lone contacts are right after one sweep.
       const auto one = [&](std::size_t k, Opened& sum) {
+        if (report.iterations == 0) {
+          if (k + lookAhead < rows_.size()) {
+            detail::prefetch(contacts[colouring.rows()[k + lookAhead].contact]);
+          }
+          fill(k, contacts, colouring, bodies, settings);
+        }
         if (report.iterations == 0 || watch_.isStale(k)) {
           open(k, settings.keepAngularMomentum, sum);
           watch_.enter(k, rows_[k].slot1, rows_[k].slot2);
@@ -125,6 +133,7 @@ class PositionalCorrection {
     bool boundary;
   };
   static constexpr std::size_t chunk = 512;
+  static constexpr std::size_t lookAhead = 8;
 
   /// The largest overlap, and the smallest radius.
   struct Extremes {
@@ -167,8 +176,7 @@ class PositionalCorrection {
   }
 
   template <class B>
-  void prepare(std::span<const Contact<S>> contacts, const ContactColoring& colouring, const B& bodies,
-               const CorrectionSettings<S>& settings) {
+  void takeUp(const ContactColoring& colouring, const B& bodies) {
     const std::size_t n = colouring.bodies().size();
     shifts_.resize(n + 1);
     parallelFor(n + 1, chunk, [&](std::size_t slot) {
@@ -178,8 +186,6 @@ class PositionalCorrection {
                        movable ? Vector3<S>(bodies.velocities()[i]) : Vector3<S>(Vector3<S>::Zero()),
                        Vector3<S>::Zero()};
     });
-    rows_.resize(contacts.size());
-    parallelFor(rows_.size(), chunk, [&](std::size_t k) { fill(k, contacts, colouring, bodies, settings); });
   }
 
   template <class B>
