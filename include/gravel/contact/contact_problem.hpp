@@ -215,8 +215,8 @@ class ContactProblem {
   }
 
   /// What the present velocities ask for. \return change of the normal velocity
-  [[gnu::flatten]] S aim(std::size_t k, const Contact<S>& c, const S& dt,
-                            const ContactSettings<S>& settings, bool loaded) {
+  [[gnu::flatten]] S aim(std::size_t k, const Contact<S>& c, const S& dt, const ContactSettings<S>& settings,
+                         bool loaded) {
     Row& row = rows[k];
     row.slides = 0;
     row.sliding = false;

@@ -84,10 +84,17 @@ class ContactSolver {
     const std::span<const Contact<S>> contacts = contacts_;
     ContactReport<S> report;
     bool solved = false;
+    sameNames_ = !handedOn_;
+    handedOn_ = false;
+    if (sameNames_) {
+      before_.swap(impulses_);
+      impulses_.resize(contacts.size());
+    }
+    const std::span<const ContactImpulse<S>> last = sameNames_ ? before_ : impulses_;
     if (!contacts.empty()) {
       // Forces that last give impulses in proportion of the steps.
       const S ratio = settings_.warmStart && memoryStep_ > S(0) ? S(dt / memoryStep_) : S(0);
-      problem_.gather(contacts, bodies, coloring_, dt, settings_, kinds_, impulses_, ratio, fresh_);
+      problem_.gather(contacts, bodies, coloring_, dt, settings_, kinds_, last, ratio, fresh_);
       fresh_ = false;
       if (problem_.active) {
         report = std::visit([&](auto& algorithm) { return algorithm.solve(problem_, coloring_, settings_); },
@@ -126,6 +133,10 @@ class ContactSolver {
   std::span<const ContactImpulse<S>> impulses() const { return impulses_; }
   const ContactColoring& coloring() const { return coloring_; }
 
+  /// Of the solve before the last one, whose contacts may have been others, in the order of their keys.
+  const ContactKeys& earlierKeys(std::size_t k) const { return (sameNames_ ? names_ : namesBefore_)[k].keys; }
+  std::span<const ContactImpulse<S>> earlierImpulses() const { return before_; }
+
   /// What the next solve() begins from: the impulses of the last one by keys, and its step [s]. A restart
   /// that puts them back continues with the same bits.
   std::vector<StoredImpulse<S>> memory() const {
@@ -140,6 +151,10 @@ class ContactSolver {
   const S& memoryStep() const { return memoryStep_; }
   /// \param memory sorted by keys
   void setMemory(const std::vector<StoredImpulse<S>>& memory, const S& step) {
+    if (sameNames_) {
+      namesBefore_.swap(names_);
+      sameNames_ = false;
+    }
     names_.clear();
     impulses_.clear();
     for (const StoredImpulse<S>& stored : memory) {
@@ -186,6 +201,8 @@ class ContactSolver {
   }
 
   void handOn(std::span<const Contact<S>> contacts) {
+    handedOn_ = true;
+    sameNames_ = false;
     before_.swap(impulses_);
     namesBefore_.swap(names_);
     impulses_.resize(contacts.size());
@@ -217,9 +234,11 @@ class ContactSolver {
   std::vector<Name> names_;                  ///< of the contacts of begin(), or of the memory put back
   std::vector<ContactImpulse<S>> impulses_;  ///< in that order
   std::vector<Name> namesBefore_;
-  std::vector<ContactImpulse<S>> before_;
+  std::vector<ContactImpulse<S>> before_;  ///< of the solve before, in the order of one of these
   S memoryStep_ = S(0);
-  bool fresh_ = true;  ///< contacts may be elsewhere than at the last gathering
+  bool handedOn_ = false;   ///< no solve() since
+  bool sameNames_ = false;  ///< `before_` goes with `names_`
+  bool fresh_ = true;       ///< contacts may be elsewhere than at the last gathering
 };
 
 }  // namespace gravel

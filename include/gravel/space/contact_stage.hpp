@@ -123,6 +123,7 @@ class ContactStage {
   void solve(Bodies& bodies, const Config& config, const Scalar& h, Profiler& profiler) {
     if (contacts_.empty()) {
       profiler.skip(Phase::ContactSolve, "no contacts");
+      solver_.begin(contacts_, bodies);
       solver_.forget();
       return;
     }
@@ -154,28 +155,19 @@ class ContactStage {
   void beginStep() {
     report_ = {};
     record_.clear();
+    firstActed_ = false;
     impacts_.clear();
   }
 
   /// A part of the step is over that began `start` [s] after it. \param last  no other one follows
-  void endPart(const Scalar& start, bool last) {
-    if (!last) {
-      record_.endPart(impacts_.impacts(), start);
-      if (acted_) {
-        record_.add(contacts_, solver_.impulses());
-      }
-      impacts_.clear();
-    } else if (record_.hasParts()) {
-      record_.addImpacts(impacts_.impacts(), start);
-    }
-  }
+  void endPart(const Scalar& start, bool last);
 
-  /// The first half of the step is solved: its impulses are kept for impulses().
+  /// The first half of the step is solved; the solver keeps its impulses while it solves the second one.
   /// \param kick [s] for which the present accelerations acted on the velocities before that
   void endFirstHalf(const ForceStage<Scalar, Layout>& force, const Bodies& bodies, const Scalar& kick) {
+    firstActed_ = acted_;
     if (acted_) {
       bookKick(force, bodies, kick);
-      record_.add(contacts_, solver_.impulses());
     }
   }
 
@@ -193,7 +185,7 @@ class ContactStage {
 
   /// Impulses of all solves of the step [N s], in the order of contacts(). A contact that ended in a drift is
   /// not among them. O(contacts).
-  std::vector<ContactImpulse<Scalar>> impulses() const { return record_.sum(contacts_, solver_.impulses()); }
+  std::vector<ContactImpulse<Scalar>> impulses() const;
 
   /// Why nothing can touch, or nullptr.
   const char* reasonToSkip(const Bodies& bodies) const {
@@ -305,8 +297,9 @@ class ContactStage {
   Scalar separationLoss_ = Scalar(0);
   bool idle_ = false;
   bool moved_ = false;
-  bool acted_ = false;     // the last solve changed velocities
-  bool coloured_ = false;  // solver_ knows the present contacts
+  bool acted_ = false;       // the last solve changed velocities
+  bool firstActed_ = false;  // so did that of the first half of this part, or of the last one
+  bool coloured_ = false;    // solver_ knows the present contacts
 };
 
 }  // namespace gravel

@@ -81,6 +81,38 @@ std::size_t ContactStage<Scalar, Layout>::touches() const {
 }
 
 template <Real Scalar, class Layout>
+void ContactStage<Scalar, Layout>::endPart(const Scalar& start, bool last) {
+  if (!last) {
+    record_.endPart(impacts_.impacts(), start);
+    if (firstActed_) {
+      record_.add(solver_.earlierImpulses(), [&](std::size_t k) { return solver_.earlierKeys(k); });
+      firstActed_ = false;
+    }
+    if (acted_ && !contacts_.empty()) {
+      record_.add(solver_.impulses(), [&](std::size_t k) {
+        return ContactKeys{contacts_[k].key1, contacts_[k].key2};
+      });
+    }
+    impacts_.clear();
+  } else if (record_.hasParts()) {
+    record_.addImpacts(impacts_.impacts(), start);
+  }
+}
+
+template <Real Scalar, class Layout>
+std::vector<ContactImpulse<Scalar>> ContactStage<Scalar, Layout>::impulses() const {
+  const std::span<const ContactImpulse<Scalar>> last = solver_.impulses();
+  std::vector<ContactImpulse<Scalar>> sum(last.begin(), last.end());
+  sum.resize(contacts_.size());
+  record_.addTo(sum, contacts_);
+  if (firstActed_) {
+    record_.addTo(sum, contacts_, solver_.earlierImpulses(),
+                  [&](std::size_t k) { return solver_.earlierKeys(k); });
+  }
+  return sum;
+}
+
+template <Real Scalar, class Layout>
 auto ContactStage<Scalar, Layout>::allTouches() const -> Touches {
   Touches all{contacts_, impulses()};
   for (const Impact<Scalar>& impact : impacts()) {

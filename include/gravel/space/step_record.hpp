@@ -5,9 +5,7 @@
 
 #include <gravel/contact/contact.hpp>
 #include <gravel/contact/impact.hpp>
-#include <gravel/core/parallel.hpp>
 
-#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -19,31 +17,22 @@ class StepRecord {
  public:
   /// A new step begins.
   void clear() {
-    holds_ = false;  // vectors keep their size: to fill them with zeros first takes as long as to copy
+    keys_.clear();
+    sums_.clear();
     impacts_.clear();
     parts_ = 1;
   }
 
-  /// Adds the impulses of a solve, both in the order of keys. O(contacts).
-  void add(std::span<const Contact<Scalar>> contacts, std::span<const ContactImpulse<Scalar>> impulses) {
-    if (!holds_) {
-      holds_ = true;
-      const std::size_t count = std::min(contacts.size(), impulses.size());
-      keys_.resize(count);
-      sums_.resize(count);
-      parallelFor(count, 1024, [&](std::size_t k) {
-        keys_[k] = {contacts[k].key1, contacts[k].key2};
-        sums_[k] = impulses[k];
-      });
-      return;
-    }
+  /// Adds the impulses of a solve, in the order of their keys, keysOf(k). O(contacts).
+  template <class KeysOf>
+  void add(std::span<const ContactImpulse<Scalar>> impulses, KeysOf&& keysOf) {
     keysBefore_.swap(keys_);
     sumsBefore_.swap(sums_);
     keys_.clear();
     sums_.clear();
     std::size_t m = 0;
-    for (std::size_t k = 0; k < contacts.size() && k < impulses.size(); ++k) {
-      const ContactKeys keys{contacts[k].key1, contacts[k].key2};
+    for (std::size_t k = 0; k < impulses.size(); ++k) {
+      const ContactKeys keys = keysOf(k);
       for (; m < keysBefore_.size() && keysBefore_[m] < keys; ++m) {
         keys_.push_back(keysBefore_[m]);
         sums_.push_back(sumsBefore_[m]);
@@ -58,24 +47,25 @@ class StepRecord {
     sums_.insert(sums_.end(), sumsBefore_.begin() + static_cast<std::ptrdiff_t>(m), sumsBefore_.end());
   }
 
-  /// The impulses of all parts: the last ones, given in the order of contacts, with those recorded here. A
-  /// contact that ended before is not among them. O(contacts).
-  std::vector<ContactImpulse<Scalar>> sum(std::span<const Contact<Scalar>> contacts,
-                                          std::span<const ContactImpulse<Scalar>> last) const {
-    std::vector<ContactImpulse<Scalar>> sum;
-    const std::size_t count = holds_ ? keys_.size() : 0;
+  /// Adds what is recorded here to the impulses `sum` of contacts. A contact that ended before is not among
+  /// them. O(contacts).
+  void addTo(std::vector<ContactImpulse<Scalar>>& sum, std::span<const Contact<Scalar>> contacts) const {
+    addTo(sum, contacts, sums_, [&](std::size_t k) { return keys_[k]; });
+  }
+  /// The same of one solve.
+  template <class KeysOf>
+  static void addTo(std::vector<ContactImpulse<Scalar>>& sum, std::span<const Contact<Scalar>> contacts,
+                    std::span<const ContactImpulse<Scalar>> impulses, KeysOf&& keysOf) {
     std::size_t m = 0;
     for (std::size_t k = 0; k < contacts.size(); ++k) {
-      sum.push_back(k < last.size() ? last[k] : ContactImpulse<Scalar>{});
       const ContactKeys keys{contacts[k].key1, contacts[k].key2};
-      while (m < count && keys_[m] < keys) {
+      while (m < impulses.size() && keysOf(m) < keys) {
         ++m;
       }
-      if (m < count && keys_[m] == keys) {
-        join(sum.back(), sums_[m]);
+      if (m < impulses.size() && keysOf(m) == keys) {
+        join(sum[k], impulses[m]);
       }
     }
-    return sum;
   }
 
   /// A part is over that began `start` [s] after the step; another one follows.
@@ -110,7 +100,6 @@ class StepRecord {
   std::vector<ContactImpulse<Scalar>> sumsBefore_;
   std::vector<Impact<Scalar>> impacts_;
   std::size_t parts_ = 1;
-  bool holds_ = false;  ///< keys_ and sums_ are of this step
 };
 
 }  // namespace gravel
