@@ -57,11 +57,12 @@ class NarrowPhase {
     boundaryContacts_.clear();
     if (walls) {
       const std::size_t count = nearBoundaries ? nearBoundaries->size() : bodies.size();
-      gather(count, [&](std::size_t k, std::vector<Contact<S>>& part, Cursor& cursor) {
-        appendBoundaries(nearBoundaries ? (*nearBoundaries)[k] : k, bodies, materials, boundaries, settings,
-                         part, cursor);
-      });
-      for (const std::vector<Contact<S>>& part : std::span(parts_).first(used_)) {
+      const std::size_t used =
+          gather(count, wallParts_, [&](std::size_t k, std::vector<Contact<S>>& part, Cursor& cursor) {
+            appendBoundaries(nearBoundaries ? (*nearBoundaries)[k] : k, bodies, materials, boundaries,
+                             settings, part, cursor);
+          });
+      for (const std::vector<Contact<S>>& part : std::span(wallParts_).first(used)) {
         boundaryContacts_.insert(boundaryContacts_.end(), part.begin(), part.end());
       }
       const auto before = [](const Contact<S>& a, const Contact<S>& b) { return keysBefore(a, b); };
@@ -69,10 +70,11 @@ class NarrowPhase {
         std::sort(boundaryContacts_.begin(), boundaryContacts_.end(), before);
       }
     }
-    gather(pairs.size(), [&](std::size_t k, std::vector<Contact<S>>& part, Cursor& cursor) {
-      appendPair(pairs[k], bodies, domain, materials, settings, part, cursor);
-    });
-    merge(out);
+    const std::size_t used =
+        gather(pairs.size(), parts_, [&](std::size_t k, std::vector<Hit>& part, Cursor& cursor) {
+          appendPair(pairs[k], bodies, domain, settings, part, cursor);
+        });
+    merge(used, bodies, materials, out);
   }
 
   /// The largest gap of a resting contact over the sum of the radii.
@@ -87,32 +89,52 @@ class NarrowPhase {
     bool placed = false;
   };
 
-  /// Calls append(k, part, cursor) for k = 0 … n-1 in chunks, of which there are `used_`.
-  template <class Append>
-  void gather(std::size_t n, Append&& append) {
-    used_ = (n + chunk - 1) / chunk;
-    if (parts_.size() < used_) {
-      parts_.resize(used_);
+  /// A pair that is a contact: half of what one takes, as it is written and read once more.
+  struct Hit {
+    Pair pair;
+    Vector3<S> normal;
+    S gap;
+    S arm1;
+    S arm2;
+    Vector3<S> drift;
+  };
+
+  /// Calls append(k, part, cursor) for k = 0 … n-1 in chunks. \return their number
+  template <class Part, class Append>
+  static std::size_t gather(std::size_t n, std::vector<Part>& parts, Append&& append) {
+    const std::size_t used = (n + chunk - 1) / chunk;
+    if (parts.size() < used) {
+      parts.resize(used);
     }
     parallelForChunks<Share::Alike>(n, chunk, [&](std::size_t begin, std::size_t end) {
-      std::vector<Contact<S>>& part = parts_[begin / chunk];
+      Part& part = parts[begin / chunk];
       part.clear();
       Cursor cursor;
       for (std::size_t k = begin; k < end; ++k) {
         append(k, part, cursor);
       }
     });
+    return used;
+  }
+
+  template <class B>
+  static ContactKeys keysOf(Pair pair, const B& bodies) {
+    return {bodies.ids()[pair.first], bodies.ids()[pair.second]};
   }
 
   /// Pairs and boundaries in the order of keys, part by part.
-  void merge(std::vector<Contact<S>>& out) {
-    const auto before = [](const Contact<S>& a, const Contact<S>& b) { return keysBefore(a, b); };
+  template <class B>
+  void merge(std::size_t used, const B& bodies, std::span<const Material<S>> materials,
+             std::vector<Contact<S>>& out) {
+    const auto before = [](const Contact<S>& wall, const ContactKeys& keys) {
+      return ContactKeys{wall.key1, wall.key2} < keys;
+    };
     starts_.assign(1, {0, 0});
-    for (std::size_t p = 0; p < used_; ++p) {
+    for (std::size_t p = 0; p < used; ++p) {
       Start next = starts_.back();
       if (!parts_[p].empty()) {
-        const auto end =
-            std::lower_bound(boundaryContacts_.begin(), boundaryContacts_.end(), parts_[p].back(), before);
+        const auto end = std::lower_bound(boundaryContacts_.begin(), boundaryContacts_.end(),
+                                          keysOf(parts_[p].back().pair, bodies), before);
         next.wall = static_cast<std::size_t>(end - boundaryContacts_.begin());
         next.place += parts_[p].size() + next.wall - starts_.back().wall;
       }
@@ -120,11 +142,23 @@ class NarrowPhase {
     }
     const Start last = starts_.back();
     out.resize(last.place + boundaryContacts_.size() - last.wall);
-    parallelForTasks<Share::Alike>(used_, [&](std::size_t p) {
-      const auto wall = boundaryContacts_.begin();
-      std::merge(parts_[p].begin(), parts_[p].end(), wall + static_cast<std::ptrdiff_t>(starts_[p].wall),
-                 wall + static_cast<std::ptrdiff_t>(starts_[p + 1].wall),
-                 out.begin() + static_cast<std::ptrdiff_t>(starts_[p].place), before);
+    parallelForTasks<Share::Alike>(used, [&](std::size_t p) {
+      auto [wall, place] = starts_[p];
+      for (const Hit& hit : parts_[p]) {
+        const auto [i, j] = hit.pair;
+        const ContactKeys keys = keysOf(hit.pair, bodies);
+        while (wall < starts_[p + 1].wall && before(boundaryContacts_[wall], keys)) {
+          out[place++] = boundaryContacts_[wall++];
+        }
+        const std::uint32_t m_i = bodies.materials()[i];
+        const std::uint32_t m_j = bodies.materials()[j];
+        const Material<S>& surface_i = surface(materials, m_i);
+        out[place++] = Contact<S>{
+            i,           j,          keys.first,
+            keys.second, hit.normal, hit.gap,
+            hit.arm1,    hit.arm2,   m_i == m_j ? surface_i : mix(surface_i, surface(materials, m_j)),
+            hit.drift};
+      }
     });
     std::copy(boundaryContacts_.begin() + static_cast<std::ptrdiff_t>(last.wall), boundaryContacts_.end(),
               out.begin() + static_cast<std::ptrdiff_t>(last.place));
@@ -176,10 +210,9 @@ class NarrowPhase {
 
   template <class B>
   static void appendPair(Pair pair, const B& bodies, const Domain<S>& domain,
-                         std::span<const Material<S>> materials, const NarrowPhaseSettings<S>& settings,
-                         std::vector<Contact<S>>& part, Cursor& cursor) {
-    std::uint32_t i = pair.first;
-    std::uint32_t j = pair.second;
+                         const NarrowPhaseSettings<S>& settings, std::vector<Hit>& part, Cursor& cursor) {
+    const std::uint32_t i = pair.first;
+    const std::uint32_t j = pair.second;
     const S r_i = bodies.radii()[i];
     const S r_j = bodies.radii()[j];
     Vector3<S> r_ij = Vector3<S>(bodies.positions()[j]) - Vector3<S>(bodies.positions()[i]);
@@ -199,17 +232,12 @@ class NarrowPhase {
         !(detail::isMovable(bodies, i) || detail::isMovable(bodies, j))) {
       return;
     }
-    const std::uint64_t id_i = bodies.ids()[i];
-    const std::uint64_t id_j = bodies.ids()[j];
-    const std::uint32_t m_i = bodies.materials()[i];
-    const std::uint32_t m_j = bodies.materials()[j];
-    if (!overlaps && !mayRest(settings, {id_i, id_j}, cursor)) {
+    const ContactKeys keys = keysOf(pair, bodies);
+    if (!overlaps && !mayRest(settings, keys, cursor)) {
       return;
     }
-    const Material<S>& surface_i = surface(materials, m_i);
-    const Touch<S> touch = touchAt<S>(r_ij, distance, r_i, reach, id_i, id_j, settings.epsilon);
-    part.push_back(Contact<S>{i, j, id_i, id_j, touch.normal, touch.gap, touch.arm1, touch.arm2,
-                              m_i == m_j ? surface_i : mix(surface_i, surface(materials, m_j)), drift});
+    const Touch<S> touch = touchAt<S>(r_ij, distance, r_i, reach, keys.first, keys.second, settings.epsilon);
+    part.push_back({pair, touch.normal, touch.gap, touch.arm1, touch.arm2, drift});
   }
 
   template <class B>
@@ -239,9 +267,9 @@ class NarrowPhase {
     std::size_t place;
   };
 
-  std::vector<std::vector<Contact<S>>> parts_;
+  std::vector<std::vector<Hit>> parts_;
+  std::vector<std::vector<Contact<S>>> wallParts_;
   std::vector<Start> starts_;
-  std::size_t used_ = 0;
   std::vector<Contact<S>> boundaryContacts_;
 };
 
