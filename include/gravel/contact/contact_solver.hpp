@@ -128,6 +128,9 @@ class ContactSolver {
 
   const std::vector<Displacement<S>>& displacements() const { return correction_.displacements(); }
 
+  /// Whether spin matters to a contact of begin().
+  bool hasFriction() const { return kinds_.rub || kinds_.turn; }
+
   /// Contacts and their impulses [N s] of the last solve(), in one order. The contacts are the caller's.
   std::span<const Contact<S>> contacts() const { return contacts_; }
   std::span<const ContactImpulse<S>> impulses() const { return impulses_; }

@@ -72,7 +72,7 @@ class NarrowPhase {
     }
     const std::size_t used =
         gather(pairs.size(), parts_, [&](std::size_t k, std::vector<Hit>& part, Cursor& cursor) {
-          appendPair(pairs[k], bodies, domain, settings, part, cursor);
+          appendPair(pairs[k], bodies, domain, materials, settings, part, cursor);
         });
     merge(used, bodies, materials, out);
   }
@@ -210,7 +210,8 @@ class NarrowPhase {
 
   template <class B>
   static void appendPair(Pair pair, const B& bodies, const Domain<S>& domain,
-                         const NarrowPhaseSettings<S>& settings, std::vector<Hit>& part, Cursor& cursor) {
+                         std::span<const Material<S>> materials, const NarrowPhaseSettings<S>& settings,
+                         std::vector<Hit>& part, Cursor& cursor) {
     const std::uint32_t i = pair.first;
     const std::uint32_t j = pair.second;
     const S r_i = bodies.radii()[i];
@@ -236,6 +237,8 @@ class NarrowPhase {
     if (!overlaps && !mayRest(settings, keys, cursor)) {
       return;
     }
+    (void)surface(materials, bodies.materials()[i]);  // refused while the list is what it was
+    (void)surface(materials, bodies.materials()[j]);
     const Touch<S> touch = touchAt<S>(r_ij, distance, r_i, reach, keys.first, keys.second, settings.epsilon);
     part.push_back({pair, touch.normal, touch.gap, touch.arm1, touch.arm2, drift});
   }
