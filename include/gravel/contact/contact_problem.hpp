@@ -206,10 +206,10 @@ class ContactProblem {
     row.contact = place.contact;
     row.c1 = ratio(c.arm1, source.radii()[c.first]);
     row.c2 = c.second == staticPartner ? S(0) : ratio(c.arm2, source.radii()[c.second]);
-    row.normalMass = detail::inverse<S>(b1.inverseMass + b2.inverseMass);
+    row.normalMass = detail::reciprocal<S>(b1.inverseMass + b2.inverseMass);
     const S mobility =
         b1.inverseMass + b2.inverseMass + row.c1 * row.c1 * b1.spin + row.c2 * row.c2 * b2.spin;
-    row.tangentialMass = detail::inverse<S>(mobility);
+    row.tangentialMass = detail::reciprocal<S>(mobility);
     row.stick = c.material.staticFriction * mobility;
     row.slide = c.material.kineticFriction * mobility;
   }

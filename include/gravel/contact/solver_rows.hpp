@@ -80,8 +80,9 @@ struct TurningRow {
   Vector3<S> rho(const SolverBody<S>& b1, const SolverBody<S>& b2) const { return q2 * b2.s - q1 * b1.s; }
 };
 
+/// 1/x; 0 of 0. Not `inverse`, a name by which Eigen would take its own scalars for arrays.
 template <Real S>
-S inverse(const S& x) {
+S reciprocal(const S& x) {
   return x > S(0) ? S(1) / x : S(0);
 }
 
@@ -92,7 +93,7 @@ TurningRow<S> turningRow(const Material<S>& material, const S& r1, const S& r2, 
   TurningRow<S> row;
   row.q1 = r2 > S(0) ? S(r2 / (r1 + r2)) : S(1);
   row.q2 = r2 > S(0) ? S(r1 / (r1 + r2)) : S(0);
-  row.mass = inverse<S>(row.q1 * row.q1 * spin1 + row.q2 * row.q2 * spin2);
+  row.mass = reciprocal<S>(row.q1 * row.q1 * spin1 + row.q2 * row.q2 * spin2);
   row.rolling = material.rollingFriction;
   row.spinning = material.spinningFriction;
   return row;
