@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <string>
-#include <type_traits>
 
 namespace gravel {
 
@@ -53,10 +52,9 @@ struct ContactReport {
   }
 };
 
-/// Impulse of a contact on its second body [N s]; on the first its opposite. Of double exactly a cache line:
-/// solvers jump through lists of them.
+/// Impulse of a contact on its second body [N s]; on the first its opposite.
 template <Real Scalar>
-struct alignas(std::is_floating_point_v<Scalar> ? 8 * sizeof(Scalar) : alignof(Scalar)) ContactImpulse {
+struct ContactImpulse {
   Scalar normal = Scalar(0);  ///< >= 0, along Contact::normal
   Vector3<Scalar> tangential = Vector3<Scalar>::Zero();
   /// Angular impulse against rolling and spinning over the effective radius r1 r2/(r1 + r2).
