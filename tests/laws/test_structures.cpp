@@ -18,8 +18,7 @@ namespace {
 constexpr double g = 9.81;
 constexpr double radius = 0.5;
 
-/// How far the upper ball has come down after 2 s, over the radius; -1 if anything moves still but it has
-/// not.
+/// How far the upper ball has come down after 3 s, over the radius.
 double sinking(int k, double amongBalls, double atFloor) {
   SimulationConfig<double> config = plain(2e-3);
   config.coeffRestitution = 0;

@@ -152,11 +152,10 @@ class NarrowPhase {
         }
         const std::uint32_t m_i = bodies.materials()[i];
         const std::uint32_t m_j = bodies.materials()[j];
-        const Material<S>& surface_i = surface(materials, m_i);
         out[place++] = Contact<S>{
             i,           j,          keys.first,
             keys.second, hit.normal, hit.gap,
-            hit.arm1,    hit.arm2,   m_i == m_j ? surface_i : mix(surface_i, surface(materials, m_j)),
+            hit.arm1,    hit.arm2,   m_i == m_j ? materials[m_i] : mix(materials[m_i], materials[m_j]),
             hit.drift};
       }
     });

@@ -67,7 +67,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
         if (local) {
           relaxStale(problem, k, sum);
         } else {
-          relaxNext(problem, k, momentum.beta, report.iterations == 0, sum);
+          relaxNext(problem, k, momentum.beta, report.iterations == 0 || !accelerate, sum);
         }
       });
       ++report.iterations;
@@ -80,18 +80,14 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       local = report.iterations == 1 ? now.changed < count / few : local;
       if (local) {
         local = report.looks < 2 * problem.rows.size();
-        if (!local) {
+        if (!local && accelerate) {
           steps_.assign(problem.rows.size(), RowStep{});
-          if (accelerate) {
-            begin(problem);
-          }
+          begin(problem);
         }
-        continue;
-      }
-      if (report.iterations == 1) {
-        findSteps(problem, colouring.loneCount());
-      }
-      if (accelerate) {
+      } else if (accelerate) {
+        if (report.iterations == 1) {
+          findSteps(problem, colouring.loneCount());
+        }
         const S old = momentum.beta;
         if (momentum.stalls(now.along, now.size, problem.friction, report.iterations)) {
           return report;
@@ -192,7 +188,8 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     }
   }
 
-  /// A row in the order of all. \param watched whether others may be passed over afterwards
+  /// A row in the order of all. \param watched goes without momentum, and others may be passed over
+  /// afterwards
   void relaxNext(ContactProblem<S>& problem, std::size_t k, const S& beta, bool watched, Progress& sum) {
     if (k + ContactProblem<S>::lookAhead < problem.rows.size()) {
       const Row& later = problem.rows[k + ContactProblem<S>::lookAhead];
@@ -299,7 +296,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
   }
 
   std::vector<BodyStep> bodySteps_;
-  std::vector<RowStep> steps_;  ///< of sweeps over all rows after the first
+  std::vector<RowStep> steps_;  ///< of sweeps with momentum
   detail::RowWatch<S> watch_;
 };
 
