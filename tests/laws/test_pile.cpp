@@ -92,3 +92,58 @@ TEST_CASE("A floor carries the weight of the heap upon it, whatever the heap is 
   CHECK_THAT(space.supportedWeight().weight[2], WithinRel(-weight, 1e-13));
   CHECK(fastest < 1e-2);
 }
+
+// Friction leaves many solutions open, and what one step leaves undone is the next one's disturbance. Where
+// gaps may fall shut as soon as they open (RestingGap::closed = 0) this heap sinks by 1.4e-4 m g R a body in
+// 250 steps, and goes on like that; so do heaps of 600 and of 10 000. It sank by 1e-5.
+// Seen to fail: that; and a closed gap of a hundredth of its size (9.7e-5).
+TEST_CASE("A settled heap with friction rests: it does not creep down") {
+#ifdef GRAVEL_TEST_SLOW
+  const std::size_t count = 200;  // the code runs; such a heap has few layers to creep
+#else
+  const std::size_t count = 1000;
+#endif
+  constexpr double radius = 0.5;
+  constexpr double g = 9.81;
+  SimulationConfig<double> config = plain(1.0 / 60);
+  config.coeffFriction = config.coeffStaticFriction = 0.5;
+  config.coeffRestitution = 0.0;
+  config.contactTolerance = 1e-2;
+  config.contactIterations = 4;
+  Space<double> space(config);
+  space.setUniformField({0, 0, -g});
+  space.addPlane({0, 0, 1}, 0.0);
+  const auto side = static_cast<std::size_t>(std::cbrt(static_cast<double>(count)) + 0.5);
+  const double spacing = 2.2 * radius;
+  const double wall = spacing * static_cast<double>(side) / 2;
+  for (const double s : {-1.0, 1.0}) {
+    space.addPlane({s, 0, 0}, -wall);
+    space.addPlane({0, s, 0}, -wall);
+  }
+  const CounterRandom random(1);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto at = [&](std::size_t k, std::uint64_t axis) {
+      return (static_cast<double>(k) + 0.5) * spacing - wall + random.uniform(3 * i + axis, -0.04, 0.04);
+    };
+    space.addBody(ball({at(i % side, 0), at(i / side % side, 1),
+                        radius + 0.04 + static_cast<double>(i / (side * side)) * spacing},
+                       {0, 0, 0}, radius, 1.0));
+  }
+  const auto height = [&] {
+    return std::get<2>(space.calculateSystemEnergy()) / (g * radius * double(count));
+  };
+  advance(space, 600);
+  const double before = height();
+  double deepest = 0;
+  for (std::size_t i = 0; i < 250; ++i) {
+    space.computeDynamics(i);
+    for (const Contact<double>& c : space.contacts()) {
+      deepest = std::max(deepest, -c.gap / radius);
+    }
+  }
+  const double sunk = before - height();
+  CAPTURE(sunk, deepest);
+  CHECK(std::abs(sunk) < 3e-5);
+  CHECK(deepest < 1e-3);
+  CHECK(std::abs(space.supportedWeight().residual()) < 1e-3);
+}

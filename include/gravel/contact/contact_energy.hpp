@@ -25,7 +25,7 @@ template <Real S>
 class ContactEnergy {
  public:
   /// Guards the energy of `problem`, fills in the losses of the report, and takes down the impulses in the
-  /// order of contacts. O(contacts).
+  /// order of rows. O(contacts).
   void settle(ContactProblem<S>& problem, const ContactColoring& colouring,
               std::span<const Contact<S>> contacts, ContactReport<S>& report,
               std::span<ContactImpulse<S>> impulses) {
@@ -51,6 +51,7 @@ class ContactEnergy {
   struct Ends {
     std::uint32_t first;
     std::uint32_t second;
+    friend bool operator==(const Ends&, const Ends&) = default;
   };
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
@@ -85,13 +86,16 @@ class ContactEnergy {
     return {row.jn * row.n.dot(v_rel), across};
   }
 
-  /// The mean of a body's velocities before and after.
-  static Body meanOf(const ContactProblem<S>& problem, std::uint32_t slot) {
-    const Body& before = problem.initial[slot];
-    Body mean = problem.bodies[slot];
-    mean.v = (before.v + mean.v) / S(2);
-    mean.s = (before.s + mean.s) / S(2);
-    return mean;
+  /// The means of the bodies' velocities before and after.
+  void findMeans(const ContactProblem<S>& problem) {
+    means_.resize(problem.bodies.size());
+    parallelFor(means_.size(), chunk, [&](std::size_t slot) {
+      const Body& before = problem.initial[slot];
+      Body& mean = means_[slot];
+      mean = problem.bodies[slot];
+      mean.v = (before.v + mean.v) / S(2);
+      mean.s = (before.s + mean.s) / S(2);
+    });
   }
 
   static Vector3<S> driftOf(const ContactProblem<S>& problem, std::span<const Contact<S>> contacts,
@@ -101,6 +105,7 @@ class ContactEnergy {
 
   Sums takeDown(const ContactProblem<S>& problem, std::span<const Contact<S>> contacts,
                 std::span<ContactImpulse<S>> impulses) {
+    findMeans(problem);
     return orderedSum(
         problem.rows.size(), chunk, Sums(Sums::Zero()), [&](std::size_t begin, std::size_t end) {
           Sums sums = Sums::Zero();
@@ -108,27 +113,26 @@ class ContactEnergy {
             const Row& row = problem.rows[k];
             if (k + problem.lookAhead < problem.rows.size()) {
               const Row& later = problem.rows[k + problem.lookAhead];
-              problem.fetch(later.slot1, later.slot2);
-              detail::prefetch(impulses[later.contact]);
+              detail::prefetch(means_[later.slot1]);
+              detail::prefetch(means_[later.slot2]);
             }
             terms_[k] = S(0);
             ends_[k] = {none, none};
             if (!(row.jn > S(0))) {
-              impulses[row.contact] = {};
-              impulses[row.contact].impact = row.impact;
+              impulses[k] = {};
+              impulses[k].impact = row.impact;
               continue;
             }
             const Vector3<S> jt = row.tangentialMass * row.u;
-            impulses[row.contact] = {problem.impulseOut(row.jn), problem.impulseOut(jt),
-                                     problem.turning.empty() ? Vector3<S>(Vector3<S>::Zero())
-                                                             : problem.impulseOut(problem.turning[k].l),
-                                     row.impact};
+            impulses[k] = {problem.impulseOut(row.jn), problem.impulseOut(jt),
+                           problem.turning.empty() ? Vector3<S>(Vector3<S>::Zero())
+                                                   : problem.impulseOut(problem.turning[k].l),
+                           row.impact};
             const Vector3<S> drift = driftOf(problem, contacts, row);
-            const auto [normal, across] =
-                power(problem, k, meanOf(problem, row.slot1), meanOf(problem, row.slot2), drift);
+            const auto [normal, across] = power(problem, k, means_[row.slot1], means_[row.slot2], drift);
             terms_[k] = normal + across;
-            ends_[k] = {problem.bodies[row.slot1].inverseMass > S(0) ? row.slot1 : none,
-                        problem.bodies[row.slot2].inverseMass > S(0) ? row.slot2 : none};
+            ends_[k] = {means_[row.slot1].inverseMass > S(0) ? row.slot1 : none,
+                        means_[row.slot2].inverseMass > S(0) ? row.slot2 : none};
             sums[0] -= normal;
             sums[1] -= across;
             if (problem.drifting) {
@@ -146,16 +150,7 @@ class ContactEnergy {
              std::span<const Contact<S>> contacts) {
     const std::size_t n = problem.bodies.size();
     gains_.assign(n, Gain{});
-    parent_.resize(n);
-    std::iota(parent_.begin(), parent_.end(), 0U);
-    for (const Ends& ends : ends_) {
-      if (ends.first != none && ends.second != none) {
-        join(ends.first, ends.second);
-      }
-    }
-    for (std::uint32_t& parent : parent_) {  // a parent comes before its children
-      parent = parent_[parent];
-    }
+    findIslands(n);
     for (std::size_t k = 0; k < terms_.size(); ++k) {
       if (terms_[k] != S(0)) {
         Gain& gain = gains_[parent_[ends_[k].first != none ? ends_[k].first : ends_[k].second]];
@@ -187,6 +182,23 @@ class ContactEnergy {
       shrink(problem, colouring);
     }
     return any;
+  }
+
+  void findIslands(std::size_t n) {
+    if (parent_.size() == n && ends_ == endsThen_) {
+      return;
+    }
+    endsThen_ = ends_;
+    parent_.resize(n);
+    std::iota(parent_.begin(), parent_.end(), 0U);
+    for (const Ends& ends : ends_) {
+      if (ends.first != none && ends.second != none) {
+        join(ends.first, ends.second);
+      }
+    }
+    for (std::uint32_t& parent : parent_) {  // a parent comes before its children
+      parent = parent_[parent];
+    }
   }
 
   void shrink(ContactProblem<S>& problem, const ContactColoring& colouring) {
@@ -229,8 +241,10 @@ class ContactEnergy {
     parent_[std::max(i, j)] = std::min(i, j);  // slots are numbered by ids: the same whatever the indices
   }
 
-  std::vector<S> terms_;    ///< J.(u^- + u^+)/2 by row
-  std::vector<Ends> ends_;  ///< by row: what islands are found from, and nothing else of it
+  std::vector<Body> means_;     ///< by slot
+  std::vector<S> terms_;        ///< J.(u^- + u^+)/2 by row
+  std::vector<Ends> ends_;      ///< by row: what islands are found from, and nothing else of it
+  std::vector<Ends> endsThen_;  ///< when `parent_` was found: in a heap at rest they are the same for long
   std::vector<std::uint32_t> parent_;
   std::vector<Gain> gains_;      ///< by the slot that stands for the island
   std::vector<Island> islands_;  ///< by the slot that stands for it

@@ -6,6 +6,7 @@
 
 #include <gravel/contact/contact_coloring.hpp>
 #include <gravel/contact/contact_settings.hpp>
+#include <gravel/contact/resting_gap.hpp>
 #include <gravel/contact/solver_rows.hpp>
 #include <gravel/core/parallel.hpp>
 
@@ -34,7 +35,7 @@ class ContactProblem {
 
   /// Takes up bodies and contacts, and the first guess of the impulses with what it does to the bodies.
   /// \param dt [s] step that these contacts stand for, >= 0
-  /// \param last impulses of the last solve in the order of contacts, zero for those that are new
+  /// \param last impulses of the last solve by row, zero for those that are new
   /// \param ratio of forces that last: the guess is `ratio` times `last`; 0 for none
   /// \param fresh contacts are others, or elsewhere, than at the last call
   template <ContactBodies B>
@@ -60,20 +61,18 @@ class ContactProblem {
         if (fresh || drifting) {
           detail::prefetch(contacts[later.contact]);
         }
-        detail::prefetch(last[later.contact]);
         fetch(later.slot1, later.slot2);
       }
       if (fresh) {
         fill(rows[k], contact, place, source);
-        gaps_[k] = contact.gap;
+        gaps_[k] = detail::RestingGap<S>::of(contact);
         if (!turning.empty()) {
           const S r2 = contact.second == staticPartner ? S(0) : S(source.radii()[contact.second]);
           turning[k] = detail::turningRow<S>(contact.material, source.radii()[contact.first], r2,
                                              bodies[place.slot1].spin, bodies[place.slot2].spin);
         }
       }
-      const ContactImpulse<S>& before = last[place.contact];
-      most += Largest{aim(k, contact, dt, settings, before.normal > S(0))};
+      most += Largest{aim(k, contact, dt, settings, last[k].normal > S(0))};
     };
     Largest most = detail::sumOverRows(0, colouring.loneCount(), Largest{}, take);
     most += detail::sumOverColours(colouring, Largest{}, [&](std::size_t k, Largest& part) {
@@ -112,7 +111,7 @@ class ContactProblem {
 
   /// What sweeps begin with in a row: the impulse of the last step again.
   detail::RowGuess<S> firstGuess(std::size_t k) const {
-    const ContactImpulse<S>& before = last_[rows[k].contact];
+    const ContactImpulse<S>& before = last_[k];
     return ratio_ > S(0) && before.normal > S(0)
                ? detail::guessOf(rows[k], impulseIn(S(ratio_ * before.normal)),
                                  impulseIn(Vector3<S>(ratio_ * before.tangential)))
@@ -234,8 +233,7 @@ class ContactProblem {
     const S present = detail::normalVelocity(row, b1, b2);
     const S v_n = present + drift_n;
     const S speed = v_n < S(0) ? S(-v_n) : v_n;
-    const S gap = gaps_[k];
-    const S allowed = gap > S(0) ? (dt > S(0) ? speedIn(S(gap / dt)) : Eigen::NumTraits<S>::highest()) : S(0);
+    const S allowed = speedIn(gaps_[k].allowedApproach(S(fall1.size + fall2.size), dt));
     // In a heap at rest relative accelerations vanish, and what a step brings is passed on by the others:
     // there no more than a fall of the step is rest.
     S pull = loaded ? S(fall1.size + fall2.size) : S(0);
@@ -287,16 +285,16 @@ class ContactProblem {
     detail::push(b1, b2, j);
     if (!turning.empty()) {
       detail::TurningRow<S>& row2 = turning[k];
-      row2.l = resistTurning<S>(impulseIn(Vector3<S>(ratio_ * last_[row.contact].turning)), row.n, row.jn,
-                                row2.rolling, row2.spinning);
+      row2.l = resistTurning<S>(impulseIn(Vector3<S>(ratio_ * last_[k].turning)), row.n, row.jn, row2.rolling,
+                                row2.spinning);
       detail::turn(row2, b1, b2, row2.l);
     }
   }
 
   static S ratio(const S& arm, const S& radius) { return radius > S(0) ? arm / radius : S(0); }
 
-  std::vector<Fall> falls_;  ///< by slot
-  std::vector<S> gaps_;      ///< [m] by row: sweeps do not look at them
+  std::vector<Fall> falls_;                  ///< by slot
+  std::vector<detail::RestingGap<S>> gaps_;  ///< by row: sweeps do not look at them
   std::span<const ContactImpulse<S>> last_;
   S ratio_ = S(0);
   int speedExponent_ = 0;

@@ -68,6 +68,8 @@ class ContactSolver {
     kinds_ = found.kinds;
     // The same pairs of the same bodies: colours, and who is remembered, stay.
     if (!asMany || found.others > 0 || !sameMovable(bodies)) {
+      before_ = copyImpulses();
+      namesBefore_.swap(names_);
       coloring_.build(contacts, bodies);
       handOn(contacts);
     }
@@ -84,13 +86,14 @@ class ContactSolver {
     const std::span<const Contact<S>> contacts = contacts_;
     ContactReport<S> report;
     bool solved = false;
+    listed_ = false;
     sameNames_ = !handedOn_;
     handedOn_ = false;
     if (sameNames_) {
-      before_.swap(impulses_);
-      impulses_.resize(contacts.size());
+      rowsBefore_.swap(rowImpulses_);
+      rowImpulses_.resize(contacts.size());
     }
-    const std::span<const ContactImpulse<S>> last = sameNames_ ? before_ : impulses_;
+    const std::span<const ContactImpulse<S>> last = sameNames_ ? rowsBefore_ : rowImpulses_;
     if (!contacts.empty()) {
       // Forces that last give impulses in proportion of the steps.
       const S ratio = settings_.warmStart && memoryStep_ > S(0) ? S(dt / memoryStep_) : S(0);
@@ -99,13 +102,13 @@ class ContactSolver {
       if (problem_.active) {
         report = std::visit([&](auto& algorithm) { return algorithm.solve(problem_, coloring_, settings_); },
                             algorithm_);
-        energy_.settle(problem_, coloring_, contacts, report, impulses_);
+        energy_.settle(problem_, coloring_, contacts, report, rowImpulses_);
         problem_.scatter(bodies, coloring_);
         solved = true;
       }
     }
     if (!solved) {
-      impulses_.assign(contacts.size(), ContactImpulse<S>{});
+      rowImpulses_.assign(contacts.size(), ContactImpulse<S>{});
     }
     report.contacts = contacts.size();
     report.colours = coloring_.colours() + (coloring_.loneCount() > 0 ? 1U : 0U);
@@ -131,22 +134,60 @@ class ContactSolver {
   /// Whether spin matters to a contact of begin().
   bool hasFriction() const { return kinds_.rub || kinds_.turn; }
 
-  /// Contacts and their impulses [N s] of the last solve(), in one order. The contacts are the caller's.
+  /// Contacts of begin(), which are the caller's, and the impulses [N s] of the last solve() in their order.
+  /// O(contacts) once a solve; the view holds until the next one.
   std::span<const Contact<S>> contacts() const { return contacts_; }
-  std::span<const ContactImpulse<S>> impulses() const { return impulses_; }
+  std::span<const ContactImpulse<S>> impulses() {
+    if (inRows_ && !listed_) {
+      remembered_ = inOrder(rowImpulses_);
+      listed_ = true;
+    }
+    return remembered_;
+  }
+  /// The same as a copy.
+  std::vector<ContactImpulse<S>> copyImpulses() const {
+    return inRows_ && !listed_ ? inOrder(rowImpulses_) : remembered_;
+  }
+
+  /// sum J.(dv_2 - dv_1) of the last solve(), along the normals and across [J]: what its impulses do to
+  /// velocities that change by dv(body) [m s^-1]. O(contacts).
+  template <class Change>
+  Eigen::Array<S, 2, 1> workOn(Change&& dv) {
+    using Sums = Eigen::Array<S, 2, 1>;
+    changes_.resize(coloring_.bodies().size() + 1);
+    changes_.back() = Vector3<S>::Zero();
+    parallelFor(coloring_.bodies().size(), chunk,
+                [&](std::size_t slot) { changes_[slot] = dv(coloring_.bodies()[slot]); });
+    return orderedSum(rowImpulses_.size(), chunk, Sums(Sums::Zero()),
+                      [&](std::size_t begin, std::size_t end) {
+                        Sums sums = Sums::Zero();
+                        for (std::size_t r = begin; r < end; ++r) {
+                          const ContactImpulse<S>& j = rowImpulses_[r];
+                          if (j.normal > S(0)) {
+                            const detail::SolverRow<S>& row = problem_.rows[r];
+                            const Vector3<S> change = changes_[row.slot2] - changes_[row.slot1];
+                            sums += Sums(j.normal * row.n.dot(change), j.tangential.dot(change));
+                          }
+                        }
+                        return sums;
+                      });
+  }
   const ContactColoring& coloring() const { return coloring_; }
 
   /// Of the solve before the last one, whose contacts may have been others, in the order of their keys.
   const ContactKeys& earlierKeys(std::size_t k) const { return (sameNames_ ? names_ : namesBefore_)[k].keys; }
-  std::span<const ContactImpulse<S>> earlierImpulses() const { return before_; }
+  std::vector<ContactImpulse<S>> earlierImpulses() const {
+    return sameNames_ ? inOrder(rowsBefore_) : before_;
+  }
 
   /// What the next solve() begins from: the impulses of the last one by keys, and its step [s]. A restart
   /// that puts them back continues with the same bits.
   std::vector<StoredImpulse<S>> memory() const {
     std::vector<StoredImpulse<S>> memory;
+    const std::vector<ContactImpulse<S>> last = copyImpulses();
     for (std::size_t k = 0; k < names_.size() && settings_.warmStart; ++k) {
-      if (impulses_[k].normal > S(0)) {
-        memory.push_back({names_[k].keys.first, names_[k].keys.second, impulses_[k]});
+      if (last[k].normal > S(0)) {
+        memory.push_back({names_[k].keys.first, names_[k].keys.second, last[k]});
       }
     }
     return memory;
@@ -155,18 +196,24 @@ class ContactSolver {
   /// \param memory sorted by keys
   void setMemory(const std::vector<StoredImpulse<S>>& memory, const S& step) {
     if (sameNames_) {
+      before_ = inOrder(rowsBefore_);
       namesBefore_.swap(names_);
       sameNames_ = false;
     }
     names_.clear();
-    impulses_.clear();
+    remembered_.clear();
     for (const StoredImpulse<S>& stored : memory) {
       names_.push_back({{stored.key1, stored.key2}, staticPartner, staticPartner});
-      impulses_.push_back(stored.impulse);
+      remembered_.push_back(stored.impulse);
     }
+    inRows_ = false;
     memoryStep_ = step;
   }
-  void forget() { std::fill(impulses_.begin(), impulses_.end(), ContactImpulse<S>{}); }
+  void forget() {
+    for (std::vector<ContactImpulse<S>>* impulses : {&rowImpulses_, &remembered_}) {
+      std::fill(impulses->begin(), impulses->end(), ContactImpulse<S>{});
+    }
+  }
 
  private:
   /// A contact as it is recognised.
@@ -203,13 +250,21 @@ class ContactSolver {
     return true;
   }
 
+  /// From the order of rows to that of contacts.
+  std::vector<ContactImpulse<S>> inOrder(std::span<const ContactImpulse<S>> ofRows) const {
+    std::vector<ContactImpulse<S>> all(ofRows.size());
+    parallelFor(ofRows.size(), chunk, [&](std::size_t r) { all[coloring_.rows()[r].contact] = ofRows[r]; });
+    return all;
+  }
+
+  /// What `before_` holds of these contacts goes to their rows.
   void handOn(std::span<const Contact<S>> contacts) {
     handedOn_ = true;
     sameNames_ = false;
-    before_.swap(impulses_);
-    namesBefore_.swap(names_);
-    impulses_.resize(contacts.size());
+    inRows_ = true;
+    listed_ = false;
     names_.resize(contacts.size());
+    origins_.resize(contacts.size());
     parallelForChunks<Share::Alike>(contacts.size(), chunk, [&](std::size_t begin, std::size_t end) {
       const auto earlier = [](const Name& name, const ContactKeys& keys) { return name.keys < keys; };
       auto old =
@@ -220,9 +275,13 @@ class ContactSolver {
           ++old;
         }
         const bool known = old != namesBefore_.end() && old->keys == names_[k].keys;
-        impulses_[k] =
-            known ? before_[static_cast<std::size_t>(old - namesBefore_.begin())] : ContactImpulse<S>{};
+        origins_[k] = known ? static_cast<std::uint32_t>(old - namesBefore_.begin()) : staticPartner;
       }
+    });
+    rowImpulses_.resize(contacts.size());
+    parallelFor(contacts.size(), chunk, [&](std::size_t r) {
+      const std::uint32_t origin = origins_[coloring_.rows()[r].contact];
+      rowImpulses_[r] = origin != staticPartner ? before_[origin] : ContactImpulse<S>{};
     });
   }
 
@@ -234,13 +293,19 @@ class ContactSolver {
   ContactEnergy<S> energy_;
   PositionalCorrection<S> correction_;
   std::span<const Contact<S>> contacts_;
-  std::vector<Name> names_;                  ///< of the contacts of begin(), or of the memory put back
-  std::vector<ContactImpulse<S>> impulses_;  ///< in that order
+  std::vector<Name> names_;                     ///< of the contacts of begin(), or of the memory put back
+  std::vector<ContactImpulse<S>> rowImpulses_;  ///< in the order of rows
+  std::vector<ContactImpulse<S>> remembered_;   ///< of a memory put back, in place of them; or `listed_`
+  bool inRows_ = true;
+  bool listed_ = false;  ///< `remembered_` is a copy of `rowImpulses_` in the order of contacts
   std::vector<Name> namesBefore_;
-  std::vector<ContactImpulse<S>> before_;  ///< of the solve before, in the order of one of these
+  std::vector<ContactImpulse<S>> before_;      ///< of the solve before, in the order of these names
+  std::vector<ContactImpulse<S>> rowsBefore_;  ///< the same where rows are still the same: `sameNames_`
+  std::vector<std::uint32_t> origins_;         ///< by contact: where `before_` has it, or staticPartner
+  std::vector<Vector3<S>> changes_;            ///< by slot: of workOn()
   S memoryStep_ = S(0);
   bool handedOn_ = false;   ///< no solve() since
-  bool sameNames_ = false;  ///< `before_` goes with `names_`
+  bool sameNames_ = false;  ///< `rowsBefore_` goes with `names_`
   bool fresh_ = true;       ///< contacts may be elsewhere than at the last gathering
 };
 

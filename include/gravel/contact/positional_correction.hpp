@@ -20,7 +20,7 @@ struct CorrectionSettings {
   Scalar tolerance =
       Scalar(1e-3);  ///< [1] > 0: sweeps end when the largest move is this times the largest overlap
   /// [1] >= 0: overlaps that are right to this times the smallest radius of a contact are right; nothing is
-  /// moved while all are below a hundredth of that.
+  /// moved while all are.
   Scalar precision = Scalar(1e-4);
   int maxIterations = 20;  ///< >= 1
   /// A pair that is moved apart keeps its angular momentum: it turns the slower. Off: velocities stay.
@@ -66,10 +66,7 @@ class PositionalCorrection {
     const Extremes all = extremesOf(contacts, bodies);
     report.largestOverlap = all.overlap;
     const S right = contacts.empty() ? S(0) : S(settings.precision * all.radius);
-    // What resting contacts leave to each other. To wait until an overlap reaches `right` saves a sixth of
-    // the step of a settled heap, but lifting all at once then turns the friction at walls around: a floor
-    // carried up to 7 % more than the weight where it carries 3 to 7 % less.
-    if (!(all.overlap * settings.factor > right / S(100))) {
+    if (!(all.overlap > right)) {
       return report;
     }
     takeUp(colouring, bodies);

@@ -234,26 +234,9 @@ class ContactStage {
   /// -J.a kick: with it booked, what rests or rolls loses nothing over a step, to rounding, and the ledger
   /// closes to the order of the integrator. A hook's work is a mean over both ends and needs no share.
   void bookKick(const ForceStage<Scalar, Layout>& force, const Bodies& bodies, const Scalar& kick) {
-    const auto fall = [&](std::uint32_t i) -> Vector3<Scalar> {
-      return i == staticPartner
-                 ? Vector3<Scalar>(Vector3<Scalar>::Zero())
-                 : Vector3<Scalar>(force.conservativeForce(bodies, i) * bodies[i].inverseMass());
-    };
-    const std::span<const ContactImpulse<Scalar>> impulses = solver_.impulses();
-    using Sums = Eigen::Array<Scalar, 2, 1>;
-    const Sums losses =
-        orderedSum(impulses.size(), 1024, Sums(Sums::Zero()), [&](std::size_t begin, std::size_t end) {
-          Sums sums = Sums::Zero();
-          for (std::size_t k = begin; k < end; ++k) {
-            const ContactImpulse<Scalar>& j = impulses[k];
-            if (j.normal > Scalar(0)) {
-              const Contact<Scalar>& c = contacts_[k];
-              const Vector3<Scalar> dv = (fall(c.second) - fall(c.first)) * kick;
-              sums += Sums(j.normal * c.normal.dot(dv), j.tangential.dot(dv));
-            }
-          }
-          return sums;
-        });
+    const Eigen::Array<Scalar, 2, 1> losses = solver_.workOn([&](std::uint32_t i) {
+      return Vector3<Scalar>(force.conservativeForce(bodies, i) * (bodies[i].inverseMass() * kick));
+    });
     report_.restitutionLoss += losses[0];
     report_.frictionLoss += losses[1];
   }

@@ -101,8 +101,7 @@ void ContactStage<Scalar, Layout>::endPart(const Scalar& start, bool last) {
 
 template <Real Scalar, class Layout>
 std::vector<ContactImpulse<Scalar>> ContactStage<Scalar, Layout>::impulses() const {
-  const std::span<const ContactImpulse<Scalar>> last = solver_.impulses();
-  std::vector<ContactImpulse<Scalar>> sum(last.begin(), last.end());
+  std::vector<ContactImpulse<Scalar>> sum = solver_.copyImpulses();
   sum.resize(contacts_.size());
   record_.addTo(sum, contacts_);
   if (firstActed_) {
@@ -231,7 +230,7 @@ void ContactStage<Scalar, Layout>::search(const Bodies& bodies, const Config& co
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     largest = std::max<Scalar>(largest, bodies.radii()[i]);
   }
-  margin_ = Scalar(2) * largest * NarrowPhase<Scalar>::restingMargin();
+  margin_ = Scalar(2) * largest * detail::restingMargin<Scalar>();
   neighbours_.update(bodies.positions(), bodies.radii(), bodies.ids(), bodies.revision(), domain, time,
                      margin_, travel);
 }

@@ -211,7 +211,7 @@ class SleepStage {
       }
       for (const RestingBody<Scalar>& body : island.members) {
         const Scalar gap = plane.normal.dot(body.position) - plane.offset - body.radius;
-        if (gap <= way + body.radius * NarrowPhase<Scalar>::restingMargin()) {
+        if (gap <= way + body.radius * detail::restingMargin<Scalar>()) {
           return true;
         }
       }
