@@ -5,6 +5,7 @@
 
 #include <gravel/contact/contact.hpp>
 #include <gravel/contact/contact_bodies.hpp>
+#include <gravel/contact/resting_gap.hpp>
 #include <gravel/core/parallel.hpp>
 #include <gravel/spatial/pair.hpp>
 
@@ -70,15 +71,18 @@ class NarrowPhase {
         std::sort(boundaryContacts_.begin(), boundaryContacts_.end(), before);
       }
     }
+    if (!pairs.empty()) {
+      spheres_.resize(bodies.size());
+      parallelFor(bodies.size(), chunk, [&](std::size_t i) {
+        spheres_[i] = {bodies.positions()[i], bodies.radii()[i]};
+      });
+    }
     const std::size_t used =
         gather(pairs.size(), parts_, [&](std::size_t k, std::vector<Hit>& part, Cursor& cursor) {
           appendPair(pairs[k], bodies, domain, materials, settings, part, cursor);
         });
     merge(used, bodies, materials, out);
   }
-
-  /// The largest gap of a resting contact over the sum of the radii.
-  static S restingMargin() { return S(1) / S(1000); }
 
  private:
   static constexpr std::size_t chunk = 2048;
@@ -175,12 +179,13 @@ class NarrowPhase {
       return settings.margin;
     }
     const S closing = acceleration() * settings.step * settings.step;
-    return std::max<S>(settings.margin, std::min<S>(closing, restingMargin() * radii));
+    return std::max<S>(settings.margin, std::min<S>(closing, detail::restingMargin<S>() * radii));
   }
 
   /// What marginOf() is at most.
   static S widestMargin(const NarrowPhaseSettings<S>& settings, const S& radii) {
-    return settings.step > S(0) ? std::max<S>(settings.margin, restingMargin() * radii) : settings.margin;
+    return settings.step > S(0) ? std::max<S>(settings.margin, detail::restingMargin<S>() * radii)
+                                : settings.margin;
   }
 
   static bool mayRest(const NarrowPhaseSettings<S>& settings, const ContactKeys& keys, Cursor& cursor) {
@@ -208,18 +213,19 @@ class NarrowPhase {
   }
 
   template <class B>
-  static void appendPair(Pair pair, const B& bodies, const Domain<S>& domain,
-                         std::span<const Material<S>> materials, const NarrowPhaseSettings<S>& settings,
-                         std::vector<Hit>& part, Cursor& cursor) {
+  void appendPair(Pair pair, const B& bodies, const Domain<S>& domain, std::span<const Material<S>> materials,
+                  const NarrowPhaseSettings<S>& settings, std::vector<Hit>& part, Cursor& cursor) const {
     const std::uint32_t i = pair.first;
     const std::uint32_t j = pair.second;
-    const S r_i = bodies.radii()[i];
-    const S r_j = bodies.radii()[j];
-    Vector3<S> r_ij = Vector3<S>(bodies.positions()[j]) - Vector3<S>(bodies.positions()[i]);
+    Vector3<S> r_ij = spheres_[j].x - spheres_[i].x;
     Vector3<S> drift = Vector3<S>::Zero();
-    domain.minimumImage(r_ij, drift, settings.time);
-    const S reach = r_i + r_j;
-    if (detail::maxAbs(r_ij) > reach + widestMargin(settings, reach)) {
+    if (!domain.isOpen()) {
+      domain.minimumImage(r_ij, drift, settings.time);
+    }
+    const S r_i = spheres_[i].r;
+    const S reach = r_i + spheres_[j].r;
+    const S far = reach + widestMargin(settings, reach);
+    if (r_ij.squaredNorm() > far * far) {
       return;  // the common case, before anything else is loaded
     }
     const S distance = detail::safeNorm(r_ij);
@@ -248,10 +254,13 @@ class NarrowPhase {
                                const NarrowPhaseSettings<S>& settings, std::vector<Contact<S>>& part,
                                Cursor& cursor) {
     const S radius = bodies.radii()[i];
+    const Vector3<S> x = bodies.positions()[i];
     for (const HalfSpace<S>& wall : boundaries) {
+      if (!(wall.normal.dot(x) - wall.offset < radius + widestMargin(settings, radius))) {
+        continue;
+      }
       const S margin = marginOf(settings, radius, [&] { return accelerationOf(bodies, i); });
-      const auto touch =
-          sphereHalfSpace<S>(Vector3<S>(bodies.positions()[i]), radius, wall.normal, wall.offset, margin);
+      const auto touch = sphereHalfSpace<S>(x, radius, wall.normal, wall.offset, margin);
       if (touch && detail::isMovable(bodies, i) &&
           (touch->gap < settings.margin ||
            mayRest(settings, {bodies.ids()[i], boundaryKey(wall.number)}, cursor))) {
@@ -263,12 +272,19 @@ class NarrowPhase {
     }
   }
 
+  /// Place and radius of a body: in double half a cache line.
+  struct alignas(alignof(S) > 32 ? alignof(S) : 32) Sphere {
+    Vector3<S> x;
+    S r;
+  };
+
   /// Where a part begins among the boundaries' contacts and in the list.
   struct Start {
     std::size_t wall;
     std::size_t place;
   };
 
+  std::vector<Sphere> spheres_;
   std::vector<std::vector<Hit>> parts_;
   std::vector<std::vector<Contact<S>>> wallParts_;
   std::vector<Start> starts_;

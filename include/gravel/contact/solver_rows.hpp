@@ -5,6 +5,8 @@
 
 #include <gravel/contact/contact.hpp>
 
+#include <algorithm>
+#include <bit>
 #include <limits>
 
 namespace gravel {
@@ -20,9 +22,13 @@ template <class T>
   }
 }
 
-/// In double a cache line.
+/// Eight scalars, at most a cache line: in double bodies are one, and rows two.
 template <Real S>
-struct alignas(alignof(S) > 64 ? alignof(S) : 64) SolverBody {
+inline constexpr std::size_t rowAlignment = std::max(alignof(S),
+                                                     std::bit_ceil(std::min<std::size_t>(64, 8 * sizeof(S))));
+
+template <Real S>
+struct alignas(rowAlignment<S>) SolverBody {
   Vector3<S> v;
   S inverseMass;
   Vector3<S> s;  ///< r w: speed of the surface
@@ -45,9 +51,8 @@ struct ProblemScales {
   }
 };
 
-/// In double two cache lines.
 template <Real S>
-struct alignas(alignof(S) > 64 ? alignof(S) : 64) SolverRow {
+struct alignas(rowAlignment<S>) SolverRow {
   Vector3<S> n;
   S c1;  ///< arm / radius
   S c2;

@@ -16,14 +16,15 @@ Quaternion<Scalar> rotated(const Quaternion<Scalar>& q, const Vector3<Scalar>& w
   const Scalar half = Scalar(1) / Scalar(2);
   const Vector3<Scalar> half_turn = w * (half * h);
   const Scalar angle_sq = half_turn.squaredNorm();
-  const Scalar angle = sqrt(angle_sq);
-  // sin(x)/x; below 1e-4 its series to x^4 is exact to 1e-26
-  const Scalar sinc = angle > Scalar(1e-4)
-                          ? Scalar(sin(angle) / angle)
-                          : Scalar(1) - angle_sq / Scalar(6) * (Scalar(1) - angle_sq / Scalar(20));
   Quaternion<Scalar> turn;
-  turn.w() = cos(angle);
-  turn.vec() = half_turn * sinc;
+  if (angle_sq > Scalar(1e-8)) {
+    const Scalar angle = sqrt(angle_sq);
+    turn.w() = cos(angle);
+    turn.vec() = half_turn * Scalar(sin(angle) / angle);
+  } else {  // series to x^4, exact to 1e-26
+    turn.w() = Scalar(1) - angle_sq / Scalar(2) * (Scalar(1) - angle_sq / Scalar(12));
+    turn.vec() = half_turn * Scalar(Scalar(1) - angle_sq / Scalar(6) * (Scalar(1) - angle_sq / Scalar(20)));
+  }
   Quaternion<Scalar> next = turn * q;
   next.normalize();
   return next;
