@@ -1,6 +1,7 @@
-/// Settled piles and an elastic gas in gravel and in Bullet (its default solver, in the precision that it is
-/// built with), in one run and in turns, so that what else the machine does disturbs both alike. One thread,
-/// processor time, median of the rounds, with the errors beside it. Built where Bullet is installed.
+/// Settled piles and an elastic gas in gravel and in Bullet (its default solver), in one run and in turns, so
+/// that what else the machine does disturbs all alike. One thread, processor time, median of the rounds, with
+/// the errors beside it. Built where Bullet is installed: in single precision, beside gravel in single and in
+/// double, and where Bullet's libraries of doubles are there (`-float64`) in double beside double.
 ///
 ///   bench_beside_bullet [bodies] [steps to settle] [rounds] [steps a round]
 
@@ -22,9 +23,10 @@ namespace {
 using namespace gravel;
 using namespace boxes;
 
+template <class S>
 class Gravel {
  public:
-  explicit Gravel(const Scene& scene) : scene_(scene), space_(spaceOf(scene, config())) {}
+  explicit Gravel(const Scene& scene) : scene_(scene), space_(spaceOf<S>(scene, config())) {}
 
   void step() {
     space_.computeDynamics(steps_++);
@@ -38,20 +40,20 @@ class Gravel {
                 space_.contacts().size(), space_.contactReport().colours,
                 static_cast<double>(sweeps_) / static_cast<double>(steps_),
                 static_cast<double>(impacts_) / static_cast<double>(steps_),
-                scene_.g > 0 ? space_.supportedWeight().residual() : 0.0);
+                scene_.g > 0 ? static_cast<double>(space_.supportedWeight().residual()) : 0.0);
     space_.printProfilingReport();
   }
 
  private:
-  static SimulationConfig<double> config() {
-    SimulationConfig<double> config;
-    config.contactTolerance = 1e-2;
+  static SimulationConfig<S> config() {
+    SimulationConfig<S> config;
+    config.contactTolerance = static_cast<S>(1e-2);
     config.contactIterations = 4;
     return config;
   }
 
   Scene scene_;
-  Space<double> space_;
+  Space<S> space_;
   std::size_t steps_ = 0;
   long sweeps_ = 0;
   std::size_t impacts_ = 0;
@@ -146,34 +148,43 @@ double timed(Engine& engine, std::size_t steps) {
 
 void compare(const char* name, const Scene& scene, std::size_t settle, std::size_t rounds,
              std::size_t steps) {
-  Gravel ours(scene);
+  Gravel<double> ours(scene);
+  std::unique_ptr<Gravel<float>> single;
+  if (sizeof(btScalar) == sizeof(float)) {
+    single = std::make_unique<Gravel<float>>(scene);
+  }
   Bullet theirs(scene);
   const double start = ours.kinetic();
-  for (std::size_t k = 0; k < settle; ++k) {
-    ours.step();
-    theirs.step();
-  }
   std::vector<double> a;
+  std::vector<double> a1;
   std::vector<double> b;
-  std::vector<double> ratio;
-  for (std::size_t r = 0; r < rounds; ++r) {
-    a.push_back(timed(ours, steps));
-    b.push_back(timed(theirs, steps));
-    ratio.push_back(b.back() / a.back());
+  for (std::size_t r = 0; r <= rounds; ++r) {
+    const std::size_t count = r == 0 ? settle : steps;
+    a.push_back(timed(ours, count));
+    a1.push_back(single ? timed(*single, count) : 0);
+    b.push_back(timed(theirs, count));
   }
   std::printf("\n%s, %zu bodies, after %zu steps\n", name, scene.bodies.size(), settle);
-  const auto line = [&](const char* who, double ms, const Errors& errors, double kinetic) {
-    std::printf("%-8s %8.2f ms a step, overlap/R mean %.1e largest %.1e, ", who, ms, errors.meanOverlap,
-                errors.largestOverlap);
+  const auto line = [&](const char* who, const std::vector<double>& times, const Errors& errors,
+                        double kinetic) {
+    std::vector<double> rounded(times.begin() + 1, times.end());  // the first one settled
+    std::vector<double> ratios;
+    for (std::size_t r = 1; r < times.size(); ++r) {
+      ratios.push_back(b[r] / times[r]);
+    }
+    std::printf("%-14s %8.2f ms a step, 1/%.2f of Bullet's, overlap/R mean %.1e largest %.1e, ", who,
+                median(rounded), median(ratios), errors.meanOverlap, errors.largestOverlap);
     if (scene.g > 0) {
       std::printf("kinetic/(N m g R) %.1e\n", errors.kinetic);
     } else {
       std::printf("kinetic energy changed by %.1e of it\n", kinetic / start - 1);
     }
   };
-  line("gravel", median(a), ours.errors(), ours.kinetic());
-  line("Bullet", median(b), theirs.errors(), theirs.kinetic());
-  std::printf("Bullet / gravel: %.2f\n", median(ratio));
+  line("gravel, double", a, ours.errors(), ours.kinetic());
+  if (single) {
+    line("gravel, float", a1, single->errors(), single->kinetic());
+  }
+  line(single ? "Bullet, float" : "Bullet, double", b, theirs.errors(), theirs.kinetic());
   ours.report();
   std::fflush(stdout);
 }

@@ -87,19 +87,25 @@ inline Scene gas(std::size_t n) {
 }
 
 /// The scene in a space of its own.
-inline gravel::Space<double> spaceOf(const Scene& scene, gravel::SimulationConfig<double> config) {
+template <class S>
+gravel::Space<S> spaceOf(const Scene& scene, gravel::SimulationConfig<S> config) {
   config.G = 0;
-  config.timeStep = scene.h;
+  config.timeStep = static_cast<S>(scene.h);
   config.adaptiveTimeStep = false;
-  config.coeffRestitution = scene.e;
-  config.coeffFriction = config.coeffStaticFriction = scene.mu;
-  gravel::Space<double> space(config);
+  config.coeffRestitution = static_cast<S>(scene.e);
+  config.coeffFriction = config.coeffStaticFriction = static_cast<S>(scene.mu);
+  gravel::Space<S> space(config);
   for (const auto& [normal, offset] : scene.planes()) {
-    space.addPlane(normal, offset);
+    space.addPlane(normal.template cast<S>(), static_cast<S>(offset));
   }
-  space.setUniformField({0, 0, -scene.g});
+  space.setUniformField({0, 0, static_cast<S>(-scene.g)});
   for (const gravel::Body<double>& body : scene.bodies) {
-    space.addBody(body);
+    gravel::Body<S> same;
+    same.position = body.position.template cast<S>();
+    same.velocity = body.velocity.template cast<S>();
+    same.mass = static_cast<S>(body.mass);
+    same.radius = static_cast<S>(body.radius);
+    space.addBody(same);
   }
   return space;
 }
@@ -110,25 +116,28 @@ struct Errors {
   double kinetic = 0;         ///< over sum m g R
 };
 
-inline double kineticEnergy(const gravel::Space<double>& space) {
+template <class S>
+double kineticEnergy(const gravel::Space<S>& space) {
   const auto energy = space.calculateSystemEnergy();
-  return std::get<0>(energy) + std::get<1>(energy);
+  return static_cast<double>(std::get<0>(energy)) + static_cast<double>(std::get<1>(energy));
 }
 
-inline Errors errorsOf(const gravel::Space<double>& space) {
+template <class S>
+Errors errorsOf(const gravel::Space<S>& space) {
   Errors errors;
   const auto radii = [&](std::uint32_t i) { return static_cast<double>(space.bodies().radii()[i]); };
-  for (const gravel::Contact<double>& c : space.contacts()) {
+  for (const gravel::Contact<S>& c : space.contacts()) {
+    const double overlap = std::max(0.0, static_cast<double>(-c.gap));
     double r = radii(c.first);
     if (c.second != gravel::staticPartner) {
       r = std::min(r, radii(c.second));
     }
-    errors.meanOverlap += std::max(0.0, -c.gap) / r / static_cast<double>(space.contacts().size());
-    errors.largestOverlap = std::max(errors.largestOverlap, -c.gap / r);
+    errors.meanOverlap += overlap / r / static_cast<double>(space.contacts().size());
+    errors.largestOverlap = std::max(errors.largestOverlap, overlap / r);
   }
   double scale = 0;
   for (std::size_t i = 0; i < space.n(); ++i) {
-    scale += space.body(i).mass() * g * space.body(i).radius();
+    scale += static_cast<double>(space.body(i).mass()) * g * radii(static_cast<std::uint32_t>(i));
   }
   errors.kinetic = kineticEnergy(space) / scale;
   return errors;
