@@ -520,9 +520,8 @@ TEST_CASE(
     }
   }
   REQUIRE(fewer.size() > 100);
-  const auto change = [](std::size_t i) { return CounterRandom(17, i).direction(0); };
-  const auto dv = [&](std::size_t i) {
-    const auto d = change(i);
+  const auto dv = [](std::size_t i) {
+    const auto d = CounterRandom(17, i).direction(0);
     return Vector3<double>(d[0], d[1], d[2]);
   };
   ContactSolver<double> solver;
