@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace gravel {
@@ -52,6 +53,26 @@ struct Contact {
     return a.key1 != b.key1 ? a.key1 < b.key1 : a.key2 < b.key2;
   }
 };
+
+/// A contact as it is recognised: its keys, and the indices that its bodies have now.
+struct ContactName {
+  ContactKeys keys;
+  std::uint32_t first;
+  std::uint32_t second;  ///< or `staticPartner`
+
+  template <Real S>
+  static ContactName of(const Contact<S>& c) {
+    return {{c.key1, c.key2}, c.first, c.second};
+  }
+  friend bool operator==(const ContactName&, const ContactName&) = default;
+};
+
+/// Where these keys are, or would be, in a list in their order.
+inline auto placeOf(std::span<const ContactName> names, const ContactKeys& keys) {
+  return std::lower_bound(
+      names.begin(), names.end(), keys,
+      [](const ContactName& name, const ContactKeys& wanted) { return name.keys < wanted; });
+}
 
 /// What occurs among the contacts of a step.
 struct ContactKinds {

@@ -25,12 +25,14 @@ template <Real S>
 class ContactEnergy {
  public:
   /// Guards the energy of `problem`, fills in the losses of the report, and takes down the impulses in the
-  /// order of rows. O(contacts).
+  /// order of rows. O(contacts). \param others the rows are not those of the last call
   void settle(ContactProblem<S>& problem, const ContactColoring& colouring,
-              std::span<const Contact<S>> contacts, ContactReport<S>& report,
-              std::span<ContactImpulse<S>> impulses) {
+              std::span<const Contact<S>> contacts, bool others, ContactReport<S>& report,
+              detail::ImpulseList<S>& impulses) {
     terms_.resize(problem.rows.size());
-    ends_.resize(problem.rows.size());
+    pushes_.resize(problem.rows.size());
+    known_ = known_ && !others;
+    impulses.resize(problem.rows.size(), !problem.turning.empty());
     Sums sums = takeDown(problem, contacts, impulses);
     if (sums[3] > S(0) && guard(problem, colouring, contacts)) {
       sums = takeDown(problem, contacts, impulses);
@@ -47,14 +49,6 @@ class ContactEnergy {
   using Sums = Eigen::Array<S, 4, 1>;
   static constexpr std::size_t chunk = 512;
 
-  /// Slots of the movable bodies of a row that pushes.
-  struct Ends {
-    std::uint32_t first;
-    std::uint32_t second;
-    friend bool operator==(const Ends&, const Ends&) = default;
-  };
-  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
-
   /// Of an island.
   struct Gain {
     S sum = S(0);   ///< of energy
@@ -67,8 +61,9 @@ class ContactEnergy {
   };
 
   /// J_n v_n, and J_t.v_t with what turns, at the velocities `b1` and `b2`.
-  static std::array<S, 2> power(const ContactProblem<S>& problem, std::size_t k, const Body& b1,
-                                const Body& b2, const Vector3<S>& drift) {
+  template <class B>
+  static std::array<S, 2> power(const ContactProblem<S>& problem, std::size_t k, const B& b1, const B& b2,
+                                const Vector3<S>& drift) {
     const Row& row = problem.rows[k];
     Vector3<S> v_rel = b2.v - b1.v;
     if (problem.drifting) {
@@ -90,7 +85,7 @@ class ContactEnergy {
   void findMeans(const ContactProblem<S>& problem) {
     means_.resize(problem.bodies.size());
     parallelFor(means_.size(), chunk, [&](std::size_t slot) {
-      const Body& before = problem.initial[slot];
+      const auto& before = problem.initial[slot];
       Body& mean = means_[slot];
       mean = problem.bodies[slot];
       mean.v = (before.v + mean.v) / S(2);
@@ -104,7 +99,7 @@ class ContactEnergy {
   }
 
   Sums takeDown(const ContactProblem<S>& problem, std::span<const Contact<S>> contacts,
-                std::span<ContactImpulse<S>> impulses) {
+                detail::ImpulseList<S>& impulses) {
     findMeans(problem);
     return orderedSum(
         problem.rows.size(), chunk, Sums(Sums::Zero()), [&](std::size_t begin, std::size_t end) {
@@ -117,22 +112,23 @@ class ContactEnergy {
               detail::prefetch(means_[later.slot2]);
             }
             terms_[k] = S(0);
-            ends_[k] = {none, none};
-            if (!(row.jn > S(0))) {
-              impulses[k] = {};
-              impulses[k].impact = row.impact;
+            pushes_[k] = row.jn > S(0) ? 1 : 0;
+            ContactImpulse<S> impulse;
+            impulse.impact = row.impact;
+            if (pushes_[k] == 0) {
+              impulses.set(k, impulse);
               continue;
             }
             const Vector3<S> jt = row.tangentialMass * row.u;
-            impulses[k] = {problem.impulseOut(row.jn), problem.impulseOut(jt),
-                           problem.turning.empty() ? Vector3<S>(Vector3<S>::Zero())
-                                                   : problem.impulseOut(problem.turning[k].l),
-                           row.impact};
+            impulse.normal = problem.impulseOut(row.jn);
+            impulse.tangential = problem.impulseOut(jt);
+            if (!problem.turning.empty()) {
+              impulse.turning = problem.impulseOut(problem.turning[k].l);
+            }
+            impulses.set(k, impulse);
             const Vector3<S> drift = driftOf(problem, contacts, row);
             const auto [normal, across] = power(problem, k, means_[row.slot1], means_[row.slot2], drift);
             terms_[k] = normal + across;
-            ends_[k] = {means_[row.slot1].inverseMass > S(0) ? row.slot1 : none,
-                        means_[row.slot2].inverseMass > S(0) ? row.slot2 : none};
             sums[0] -= normal;
             sums[1] -= across;
             if (problem.drifting) {
@@ -150,10 +146,11 @@ class ContactEnergy {
              std::span<const Contact<S>> contacts) {
     const std::size_t n = problem.bodies.size();
     gains_.assign(n, Gain{});
-    findIslands(n);
+    findIslands(colouring);
     for (std::size_t k = 0; k < terms_.size(); ++k) {
       if (terms_[k] != S(0)) {
-        Gain& gain = gains_[parent_[ends_[k].first != none ? ends_[k].first : ends_[k].second]];
+        const ContactColoring::Row& row = colouring.rows()[k];
+        Gain& gain = gains_[parent_[colouring.movable(row.slot1) ? row.slot1 : row.slot2]];
         gain.sum += terms_[k];
         gain.size += terms_[k] < S(0) ? S(-terms_[k]) : terms_[k];
       }
@@ -184,16 +181,19 @@ class ContactEnergy {
     return any;
   }
 
-  void findIslands(std::size_t n) {
-    if (parent_.size() == n && ends_ == endsThen_) {
+  /// In a heap at rest the same contacts push for long.
+  void findIslands(const ContactColoring& colouring) {
+    if (known_ && pushes_ == pushedThen_) {
       return;
     }
-    endsThen_ = ends_;
-    parent_.resize(n);
+    known_ = true;
+    pushedThen_ = pushes_;
+    parent_.resize(colouring.bodies().size() + 1);
     std::iota(parent_.begin(), parent_.end(), 0U);
-    for (const Ends& ends : ends_) {
-      if (ends.first != none && ends.second != none) {
-        join(ends.first, ends.second);
+    for (std::size_t k = 0; k < pushes_.size(); ++k) {
+      const ContactColoring::Row& row = colouring.rows()[k];
+      if (pushes_[k] != 0 && colouring.movable(row.slot1) && colouring.movable(row.slot2)) {
+        join(row.slot1, row.slot2);
       }
     }
     for (std::uint32_t& parent : parent_) {  // a parent comes before its children
@@ -216,7 +216,7 @@ class ContactEnergy {
       const S beta = islands_[find(slot)].beta;
       if (beta < S(1) && colouring.movable(slot)) {
         Body& b = problem.bodies[slot];
-        const Body& b0 = problem.initial[slot];
+        const auto& b0 = problem.initial[slot];
         b.v = b0.v + beta * Vector3<S>(b.v - b0.v);
         b.s = b0.s + beta * Vector3<S>(b.s - b0.s);
       }
@@ -241,10 +241,11 @@ class ContactEnergy {
     parent_[std::max(i, j)] = std::min(i, j);  // slots are numbered by ids: the same whatever the indices
   }
 
-  std::vector<Body> means_;     ///< by slot
-  std::vector<S> terms_;        ///< J.(u^- + u^+)/2 by row
-  std::vector<Ends> ends_;      ///< by row: what islands are found from, and nothing else of it
-  std::vector<Ends> endsThen_;  ///< when `parent_` was found: in a heap at rest they are the same for long
+  std::vector<Body> means_;               ///< by slot
+  std::vector<S> terms_;                  ///< J.(u^- + u^+)/2 by row
+  std::vector<std::uint8_t> pushes_;      ///< by row
+  std::vector<std::uint8_t> pushedThen_;  ///< when `parent_` was found
+  bool known_ = false;                    ///< `parent_` is of these rows and `pushedThen_`
   std::vector<std::uint32_t> parent_;
   std::vector<Gain> gains_;      ///< by the slot that stands for the island
   std::vector<Island> islands_;  ///< by the slot that stands for it

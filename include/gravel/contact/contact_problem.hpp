@@ -5,7 +5,7 @@
 /// and one row a contact. Layouts and user's arrays end here.
 
 #include <gravel/contact/contact_coloring.hpp>
-#include <gravel/contact/contact_settings.hpp>
+#include <gravel/contact/impulse_list.hpp>
 #include <gravel/contact/resting_gap.hpp>
 #include <gravel/contact/solver_rows.hpp>
 #include <gravel/core/parallel.hpp>
@@ -23,9 +23,9 @@ class ContactProblem {
   using Row = detail::SolverRow<S>;
   using Scales = detail::ProblemScales<S>;
 
-  std::vector<Body> bodies;             ///< by slot; the last one is the boundary, at rest
-  std::vector<Body> initial;            ///< the same before any impulse
-  std::vector<Row> rows;                ///< in the colouring's order
+  std::vector<Body> bodies;                     ///< by slot; the last one is the boundary, at rest
+  std::vector<detail::SolverStart<S>> initial;  ///< the same before any impulse
+  std::vector<Row> rows;                        ///< in the colouring's order
   std::vector<Vector3<S>> slipTargets;  ///< slip after a blow that sticks, by row; empty if zero for all
   std::vector<detail::TurningRow<S>> turning;  ///< by row; empty if nothing resists rolling or spinning
   bool friction = false;                       ///< any contact where spin matters
@@ -41,13 +41,13 @@ class ContactProblem {
   template <ContactBodies B>
   void gather(std::span<const Contact<S>> contacts, const B& source, const ContactColoring& colouring,
               const S& dt, const ContactSettings<S>& settings, const ContactKinds& kinds,
-              std::span<const ContactImpulse<S>> last, const S& ratio, bool fresh) {
+              const detail::ImpulseList<S>& last, const S& ratio, bool fresh) {
     friction = kinds.rub || kinds.turn;
     drifting = kinds.drift;
     const int massExponent = massExponent_;
     gatherBodies(source, colouring);
     fresh = fresh || massExponent != massExponent_ || rows.size() != contacts.size();
-    last_ = last;
+    last_ = &last;
     ratio_ = ratio;
     rows.resize(contacts.size());
     gaps_.resize(contacts.size());
@@ -72,7 +72,7 @@ class ContactProblem {
                                              bodies[place.slot1].spin, bodies[place.slot2].spin);
         }
       }
-      most += Largest{aim(k, contact, dt, settings, last[k].normal > S(0))};
+      most += Largest{aim(k, contact, dt, settings, last.normal(k) > S(0))};
     };
     Largest most = detail::sumOverRows(0, colouring.loneCount(), Largest{}, take);
     most += detail::sumOverColours(colouring, Largest{}, [&](std::size_t k, Largest& part) {
@@ -111,10 +111,9 @@ class ContactProblem {
 
   /// What sweeps begin with in a row: the impulse of the last step again.
   detail::RowGuess<S> firstGuess(std::size_t k) const {
-    const ContactImpulse<S>& before = last_[k];
-    return ratio_ > S(0) && before.normal > S(0)
-               ? detail::guessOf(rows[k], impulseIn(S(ratio_ * before.normal)),
-                                 impulseIn(Vector3<S>(ratio_ * before.tangential)))
+    return ratio_ > S(0) && last_->normal(k) > S(0)
+               ? detail::guessOf(rows[k], impulseIn(S(ratio_ * last_->normal(k))),
+                                 impulseIn(Vector3<S>(ratio_ * last_->tangential(k))))
                : detail::RowGuess<S>{};
   }
 
@@ -134,10 +133,6 @@ class ContactProblem {
  private:
   static constexpr std::size_t chunk = 512;
 
-  struct Fall {
-    Vector3<S> a;  ///< [m s^-2] zero of what nothing moves
-    S size;
-  };
   struct Largest {
     S value = S(0);
     Largest& operator+=(const Largest& other) {
@@ -151,7 +146,7 @@ class ContactProblem {
     const std::size_t n = colouring.bodies().size();
     bodies.resize(n + 1);
     initial.resize(n + 1);
-    falls_.resize(n + 1);
+    accelerations_.resize(n + 1);
     const Scales scales = orderedSum(n, chunk, Scales{}, [&](std::size_t begin, std::size_t end) {
       Scales part;
       for (std::size_t slot = begin; slot < end; ++slot) {
@@ -159,7 +154,8 @@ class ContactProblem {
       }
       return part;
     });
-    falls_[n] = {Vector3<S>::Zero(), S(0)};
+    accelerations_[n] = Vector3<S>::Zero();
+    initial[n].fall = S(0);
     bodies[n] = Body{Vector3<S>::Zero(), S(0), Vector3<S>::Zero(), S(0)};
     speedExponent_ = detail::scaleExponent<S>(scales.fastest, scales.fastest);
     massExponent_ = detail::scaleExponent<S>(scales.lightest, scales.heaviest);
@@ -173,7 +169,8 @@ class ContactProblem {
         b.inverseMass = S(1) / detail::scaled<S>(b.inverseMass, massExponent_);
         b.spin *= b.inverseMass;
       }
-      initial[slot] = b;
+      initial[slot].v = b.v;
+      initial[slot].s = b.s;
     });
   }
 
@@ -188,7 +185,8 @@ class ContactProblem {
     b.s =
         friction ? Vector3<S>(r * Vector3<S>(source.angularVelocities()[i])) : Vector3<S>(Vector3<S>::Zero());
     const Vector3<S> a = movable ? Vector3<S>(source.accelerations()[i]) : Vector3<S>(Vector3<S>::Zero());
-    falls_[slot] = {a, detail::safeNorm(a)};
+    accelerations_[slot] = a;
+    initial[slot].fall = detail::safeNorm(a);
     b.inverseMass = movable ? S(source.masses()[i]) : S(0);  // the mass, until its scale is known
     b.spin = movable && r > S(0) && k > S(0) ? S(1) / k : S(0);
     return {std::max<S>(detail::maxAbs(b.v), detail::maxAbs(b.s)), b.inverseMass, b.inverseMass};
@@ -224,22 +222,21 @@ class ContactProblem {
     if (!turning.empty()) {
       turning[k].l = turning[k].step = Vector3<S>::Zero();
     }
-    const Body& b1 = initial[row.slot1];
-    const Body& b2 = initial[row.slot2];
-    const Fall& fall1 = falls_[row.slot1];
-    const Fall& fall2 = falls_[row.slot2];
+    const auto& b1 = initial[row.slot1];
+    const auto& b2 = initial[row.slot2];
+    const S falls = b1.fall + b2.fall;
     const Vector3<S> drift = drifting ? speedIn(c.drift) : Vector3<S>(Vector3<S>::Zero());
     const S drift_n = row.n.dot(drift);
     const S present = detail::normalVelocity(row, b1, b2);
     const S v_n = present + drift_n;
     const S speed = v_n < S(0) ? S(-v_n) : v_n;
-    const S allowed = speedIn(gaps_[k].allowedApproach(S(fall1.size + fall2.size), dt));
+    const S allowed = speedIn(gaps_[k].allowedApproach(falls, dt));
     // In a heap at rest relative accelerations vanish, and what a step brings is passed on by the others:
     // there no more than a fall of the step is rest.
-    S pull = loaded ? S(fall1.size + fall2.size) : S(0);
+    S pull = loaded ? falls : S(0);
     bool fast = speed > speedIn(S(settings.restitutionThreshold + pull * dt));
     if (fast) {
-      const S a_n = row.n.dot(Vector3<S>(fall2.a - fall1.a));
+      const S a_n = row.n.dot(Vector3<S>(accelerations_[row.slot2] - accelerations_[row.slot1]));
       pull = std::max<S>(pull, S(2) * (a_n < S(0) ? S(-a_n) : a_n));
       fast = speed > speedIn(S(settings.restitutionThreshold + pull * dt));
     }
@@ -285,17 +282,17 @@ class ContactProblem {
     detail::push(b1, b2, j);
     if (!turning.empty()) {
       detail::TurningRow<S>& row2 = turning[k];
-      row2.l = resistTurning<S>(impulseIn(Vector3<S>(ratio_ * last_[k].turning)), row.n, row.jn, row2.rolling,
-                                row2.spinning);
+      row2.l = resistTurning<S>(impulseIn(Vector3<S>(ratio_ * last_->turning(k))), row.n, row.jn,
+                                row2.rolling, row2.spinning);
       detail::turn(row2, b1, b2, row2.l);
     }
   }
 
   static S ratio(const S& arm, const S& radius) { return radius > S(0) ? arm / radius : S(0); }
 
-  std::vector<Fall> falls_;                  ///< by slot
-  std::vector<detail::RestingGap<S>> gaps_;  ///< by row: sweeps do not look at them
-  std::span<const ContactImpulse<S>> last_;
+  std::vector<Vector3<S>> accelerations_;         ///< [m s^-2] by slot, zero of what nothing moves
+  std::vector<detail::RestingGap<S>> gaps_;       ///< by row: sweeps do not look at them
+  const detail::ImpulseList<S>* last_ = nullptr;  ///< while it is solved
   S ratio_ = S(0);
   int speedExponent_ = 0;
   int massExponent_ = 0;

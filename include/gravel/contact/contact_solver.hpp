@@ -61,14 +61,15 @@ class ContactSolver {
           Findings part;
           for (std::size_t k = begin; k < end; ++k) {
             part.kinds.include(contacts[k]);
-            part.others += asMany && names_[k] == nameOf(contacts[k]) ? 0 : 1;
+            part.others += asMany && names_[k] == ContactName::of(contacts[k]) ? 0 : 1;
           }
           return part;
         });
     kinds_ = found.kinds;
     // The same pairs of the same bodies: colours, and who is remembered, stay.
     if (!asMany || found.others > 0 || !sameMovable(bodies)) {
-      before_ = copyImpulses();
+      before_ = inRows_ ? rowImpulses_.moved([&](std::size_t r) { return coloring_.rows()[r].contact; })
+                        : std::move(restored_);
       namesBefore_.swap(names_);
       coloring_.build(contacts, bodies);
       handOn(contacts);
@@ -89,26 +90,23 @@ class ContactSolver {
     listed_ = false;
     sameNames_ = !handedOn_;
     handedOn_ = false;
-    if (sameNames_) {
-      rowsBefore_.swap(rowImpulses_);
-      rowImpulses_.resize(contacts.size());
-    }
-    const std::span<const ContactImpulse<S>> last = sameNames_ ? rowsBefore_ : rowImpulses_;
+    std::swap(rowsBefore_, rowImpulses_);
     if (!contacts.empty()) {
       // Forces that last give impulses in proportion of the steps.
       const S ratio = settings_.warmStart && memoryStep_ > S(0) ? S(dt / memoryStep_) : S(0);
-      problem_.gather(contacts, bodies, coloring_, dt, settings_, kinds_, last, ratio, fresh_);
+      problem_.gather(contacts, bodies, coloring_, dt, settings_, kinds_, rowsBefore_, ratio, fresh_);
       fresh_ = false;
       if (problem_.active) {
         report = std::visit([&](auto& algorithm) { return algorithm.solve(problem_, coloring_, settings_); },
                             algorithm_);
-        energy_.settle(problem_, coloring_, contacts, report, rowImpulses_);
+        energy_.settle(problem_, coloring_, contacts, otherRows_, report, rowImpulses_);
+        otherRows_ = false;
         problem_.scatter(bodies, coloring_);
         solved = true;
       }
     }
     if (!solved) {
-      rowImpulses_.assign(contacts.size(), ContactImpulse<S>{});
+      rowImpulses_.clear(contacts.size());
     }
     report.contacts = contacts.size();
     report.colours = coloring_.colours() + (coloring_.loneCount() > 0 ? 1U : 0U);
@@ -129,6 +127,9 @@ class ContactSolver {
     return correction_.apply(contacts_, coloring_, bodies, settings);
   }
 
+  /// The contacts of begin() by name; the view holds until the next one.
+  std::span<const ContactName> names() const { return names_; }
+
   const std::vector<Displacement<S>>& displacements() const { return correction_.displacements(); }
 
   /// Whether spin matters to a contact of begin().
@@ -138,15 +139,15 @@ class ContactSolver {
   /// O(contacts) once a solve; the view holds until the next one.
   std::span<const Contact<S>> contacts() const { return contacts_; }
   std::span<const ContactImpulse<S>> impulses() {
-    if (inRows_ && !listed_) {
-      remembered_ = inOrder(rowImpulses_);
+    if (!listed_) {
+      list_ = copyImpulses();
       listed_ = true;
     }
-    return remembered_;
+    return list_;
   }
   /// The same as a copy.
   std::vector<ContactImpulse<S>> copyImpulses() const {
-    return inRows_ && !listed_ ? inOrder(rowImpulses_) : remembered_;
+    return inRows_ ? inOrder(rowImpulses_) : restored_.listed();
   }
 
   /// sum J.(dv_2 - dv_1) of the last solve(), along the normals and across [J]: what its impulses do to
@@ -162,11 +163,11 @@ class ContactSolver {
                       [&](std::size_t begin, std::size_t end) {
                         Sums sums = Sums::Zero();
                         for (std::size_t r = begin; r < end; ++r) {
-                          const ContactImpulse<S>& j = rowImpulses_[r];
-                          if (j.normal > S(0)) {
+                          const S j_n = rowImpulses_.normal(r);
+                          if (j_n > S(0)) {
                             const detail::SolverRow<S>& row = problem_.rows[r];
                             const Vector3<S> change = changes_[row.slot2] - changes_[row.slot1];
-                            sums += Sums(j.normal * row.n.dot(change), j.tangential.dot(change));
+                            sums += Sums(j_n * row.n.dot(change), rowImpulses_.tangential(r).dot(change));
                           }
                         }
                         return sums;
@@ -177,7 +178,7 @@ class ContactSolver {
   /// Of the solve before the last one, whose contacts may have been others, in the order of their keys.
   const ContactKeys& earlierKeys(std::size_t k) const { return (sameNames_ ? names_ : namesBefore_)[k].keys; }
   std::vector<ContactImpulse<S>> earlierImpulses() const {
-    return sameNames_ ? inOrder(rowsBefore_) : before_;
+    return sameNames_ ? inOrder(rowsBefore_) : before_.listed();
   }
 
   /// What the next solve() begins from: the impulses of the last one by keys, and its step [s]. A restart
@@ -196,38 +197,28 @@ class ContactSolver {
   /// \param memory sorted by keys
   void setMemory(const std::vector<StoredImpulse<S>>& memory, const S& step) {
     if (sameNames_) {
-      before_ = inOrder(rowsBefore_);
+      before_ = rowsBefore_.moved([&](std::size_t r) { return coloring_.rows()[r].contact; });
       namesBefore_.swap(names_);
       sameNames_ = false;
     }
     names_.clear();
-    remembered_.clear();
+    restored_.resize(memory.size(), true);
+    listed_ = false;
     for (const StoredImpulse<S>& stored : memory) {
+      restored_.set(names_.size(), stored.impulse);
       names_.push_back({{stored.key1, stored.key2}, staticPartner, staticPartner});
-      remembered_.push_back(stored.impulse);
     }
     inRows_ = false;
     memoryStep_ = step;
   }
   void forget() {
-    for (std::vector<ContactImpulse<S>>* impulses : {&rowImpulses_, &remembered_}) {
-      std::fill(impulses->begin(), impulses->end(), ContactImpulse<S>{});
-    }
+    rowImpulses_.clear(rowImpulses_.size());
+    restored_.clear(restored_.size());
+    listed_ = false;
   }
 
  private:
-  /// A contact as it is recognised.
-  struct Name {
-    ContactKeys keys;
-    std::uint32_t first;
-    std::uint32_t second;
-
-    friend bool operator==(const Name&, const Name&) = default;
-  };
-
   static constexpr std::size_t chunk = 512;
-
-  static Name nameOf(const Contact<S>& c) { return {{c.key1, c.key2}, c.first, c.second}; }
 
   /// What begin() looks for in the contacts.
   struct Findings {
@@ -251,26 +242,28 @@ class ContactSolver {
   }
 
   /// From the order of rows to that of contacts.
-  std::vector<ContactImpulse<S>> inOrder(std::span<const ContactImpulse<S>> ofRows) const {
+  std::vector<ContactImpulse<S>> inOrder(const detail::ImpulseList<S>& ofRows) const {
     std::vector<ContactImpulse<S>> all(ofRows.size());
-    parallelFor(ofRows.size(), chunk, [&](std::size_t r) { all[coloring_.rows()[r].contact] = ofRows[r]; });
+    parallelFor(ofRows.size(), chunk,
+                [&](std::size_t r) { all[coloring_.rows()[r].contact] = ofRows.get(r); });
     return all;
   }
 
   /// What `before_` holds of these contacts goes to their rows.
   void handOn(std::span<const Contact<S>> contacts) {
     handedOn_ = true;
+    otherRows_ = true;
+    listed_ = false;
     sameNames_ = false;
     inRows_ = true;
-    listed_ = false;
     names_.resize(contacts.size());
     origins_.resize(contacts.size());
     parallelForChunks<Share::Alike>(contacts.size(), chunk, [&](std::size_t begin, std::size_t end) {
-      const auto earlier = [](const Name& name, const ContactKeys& keys) { return name.keys < keys; };
-      auto old =
-          std::lower_bound(namesBefore_.begin(), namesBefore_.end(), nameOf(contacts[begin]).keys, earlier);
+      const auto earlier = [](const ContactName& name, const ContactKeys& keys) { return name.keys < keys; };
+      auto old = std::lower_bound(namesBefore_.begin(), namesBefore_.end(),
+                                  ContactName::of(contacts[begin]).keys, earlier);
       for (std::size_t k = begin; k < end; ++k) {
-        names_[k] = nameOf(contacts[k]);
+        names_[k] = ContactName::of(contacts[k]);
         while (old != namesBefore_.end() && old->keys < names_[k].keys) {
           ++old;
         }
@@ -278,10 +271,10 @@ class ContactSolver {
         origins_[k] = known ? static_cast<std::uint32_t>(old - namesBefore_.begin()) : staticPartner;
       }
     });
-    rowImpulses_.resize(contacts.size());
+    rowImpulses_.resize(contacts.size(), before_.turns());
     parallelFor(contacts.size(), chunk, [&](std::size_t r) {
       const std::uint32_t origin = origins_[coloring_.rows()[r].contact];
-      rowImpulses_[r] = origin != staticPartner ? before_[origin] : ContactImpulse<S>{};
+      rowImpulses_.set(r, origin != staticPartner ? before_.get(origin) : ContactImpulse<S>{});
     });
   }
 
@@ -293,18 +286,20 @@ class ContactSolver {
   ContactEnergy<S> energy_;
   PositionalCorrection<S> correction_;
   std::span<const Contact<S>> contacts_;
-  std::vector<Name> names_;                     ///< of the contacts of begin(), or of the memory put back
-  std::vector<ContactImpulse<S>> rowImpulses_;  ///< in the order of rows
-  std::vector<ContactImpulse<S>> remembered_;   ///< of a memory put back, in place of them; or `listed_`
+  std::vector<ContactName> names_;      ///< of the contacts of begin(), or of the memory put back
+  detail::ImpulseList<S> rowImpulses_;  ///< in the order of rows
+  detail::ImpulseList<S> restored_;     ///< of a memory put back, in place of them
   bool inRows_ = true;
-  bool listed_ = false;  ///< `remembered_` is a copy of `rowImpulses_` in the order of contacts
-  std::vector<Name> namesBefore_;
-  std::vector<ContactImpulse<S>> before_;      ///< of the solve before, in the order of these names
-  std::vector<ContactImpulse<S>> rowsBefore_;  ///< the same where rows are still the same: `sameNames_`
-  std::vector<std::uint32_t> origins_;         ///< by contact: where `before_` has it, or staticPartner
-  std::vector<Vector3<S>> changes_;            ///< by slot: of workOn()
+  std::vector<ContactImpulse<S>> list_;  ///< of impulses(), if `listed_`
+  bool listed_ = false;
+  std::vector<ContactName> namesBefore_;
+  detail::ImpulseList<S> before_;       ///< of the solve before, in the order of these names
+  detail::ImpulseList<S> rowsBefore_;   ///< the same where rows are still the same: `sameNames_`
+  std::vector<std::uint32_t> origins_;  ///< by contact: where `before_` has it, or staticPartner
+  std::vector<Vector3<S>> changes_;     ///< by slot: of workOn()
   S memoryStep_ = S(0);
   bool handedOn_ = false;   ///< no solve() since
+  bool otherRows_ = true;   ///< than those that `energy_` knows
   bool sameNames_ = false;  ///< `rowsBefore_` goes with `names_`
   bool fresh_ = true;       ///< contacts may be elsewhere than at the last gathering
 };

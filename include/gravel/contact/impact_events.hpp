@@ -60,7 +60,7 @@ class ImpactEvents : private detail::ImpactForecast<S> {
   template <ContactBodies B, class Candidates, class Course = StraightCourse<S>, class Decide = NoDecision>
   ImpactReport<S> resolve(B& bodies, Candidates& near, const Domain<S>& domain,
                           std::span<const Material<S>> materials, std::span<const HalfSpace<S>> walls,
-                          std::span<const Contact<S>> held, const ImpactSettings<S>& settings,
+                          std::span<const ContactName> held, const ImpactSettings<S>& settings,
                           std::optional<std::span<const std::uint32_t>> nearWalls = std::nullopt,
                           Course&& course = {}, const Decide& decide = {}) {
     using Path = std::remove_reference_t<Course>;
@@ -76,7 +76,7 @@ class ImpactEvents : private detail::ImpactForecast<S> {
       touched_.clear();
       history_.resize(bodies.size());
       leans_.assign(bodies.size(), 0);
-      for (const Contact<S>& c : held) {
+      for (const ContactName& c : held) {
         leans_[c.first] = 1;
         if (c.second != staticPartner) {
           leans_[c.second] = 1;

@@ -24,7 +24,7 @@ class ImpactForecast {
     const Domain<S>& domain;
     std::span<const Material<S>> materials;
     std::span<const HalfSpace<S>> walls;
-    std::span<const Contact<S>> held;
+    std::span<const ContactName> held;
     const ImpactSettings<S>& settings;
     Course& course;
 
@@ -99,22 +99,20 @@ class ImpactForecast {
       if (!swept_.mayMeet(i, j, scene.domain, scene.settings.time, scene.settings.h, drift)) {
         continue;
       }
-      const std::uint64_t key1 = scene.bodies.ids()[i];
-      const std::uint64_t key2 = scene.bodies.ids()[j];
+      const ContactKeys keys{scene.bodies.ids()[i], scene.bodies.ids()[j]};
       if (!placed) {
-        next = lowerBound(scene.held, key1, key2);
+        next = placeOf(scene.held, keys);
         placed = true;
       }
-      while (next != scene.held.end() && keysOf(*next) < std::pair(key1, key2)) {
+      while (next != scene.held.end() && next->keys < keys) {
         ++next;
       }
-      if ((next != scene.held.end() && keysOf(*next) == std::pair(key1, key2)) ||
-          !detail::canTouch(scene.bodies, i, j)) {
+      if ((next != scene.held.end() && next->keys == keys) || !detail::canTouch(scene.bodies, i, j)) {
         continue;
       }
       const S reach = S(scene.bodies.radii()[i]) + S(scene.bodies.radii()[j]);
       if (const auto t = timeOfImpact<S>(flightOf(scene, i, j, drift), reach, S(0))) {
-        out.push_back({*t, i, j, key1, key2});
+        out.push_back({*t, i, j, keys.first, keys.second});
       }
     }
   }
@@ -133,19 +131,16 @@ class ImpactForecast {
       if (const auto t = timeOfImpact<S>(flightOf(scene, i, wall), wall.normal, radius, S(0))) {
         const std::uint64_t key1 = scene.bodies.ids()[i];
         const std::uint64_t key2 = boundaryKey(wall.number);
-        const auto found = lowerBound(scene.held, key1, key2);
-        if (found == scene.held.end() || keysOf(*found) != std::pair(key1, key2)) {
+        if (!isListed(scene.held, {key1, key2})) {
           out.push_back({*t, i, staticPartner, key1, key2, 0, 0, w});
         }
       }
     }
   }
 
-  static std::pair<std::uint64_t, std::uint64_t> keysOf(const Contact<S>& c) { return {c.key1, c.key2}; }
-
-  static auto lowerBound(std::span<const Contact<S>> held, std::uint64_t key1, std::uint64_t key2) {
-    return std::partition_point(held.begin(), held.end(),
-                                [&](const Contact<S>& c) { return keysOf(c) < std::pair(key1, key2); });
+  static bool isListed(std::span<const ContactName> names, const ContactKeys& keys) {
+    const auto found = placeOf(names, keys);
+    return found != names.end() && found->keys == keys;
   }
 
   /// Pairs of each body, as places in the list.
@@ -246,8 +241,7 @@ class ImpactForecast {
         return true;
       }
     }
-    const auto found = lowerBound(scene.held, key1, key2);
-    return found != scene.held.end() && keysOf(*found) == std::pair(key1, key2);
+    return isListed(scene.held, {key1, key2});
   }
 
   template <class Scene>

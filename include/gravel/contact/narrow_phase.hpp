@@ -28,7 +28,7 @@ struct NarrowPhaseSettings {
   /// radii. Such a contact may approach until its gap is closed.
   Scalar step = Scalar(0);
   /// Who rests on whom, sorted: only these stay contacts with a gap. Without it every pair so near does.
-  std::optional<std::span<const ContactKeys>> resting = std::nullopt;
+  std::optional<std::span<const ContactName>> resting = std::nullopt;
 };
 
 /// Turns candidate pairs and boundaries into the list of contacts, sorted by keys. Keeps its workspace from
@@ -78,10 +78,10 @@ class NarrowPhase {
       });
     }
     const std::size_t used =
-        gather(pairs.size(), parts_, [&](std::size_t k, std::vector<Hit>& part, Cursor& cursor) {
+        gather(pairs.size(), parts_, [&](std::size_t k, std::vector<Pair>& part, Cursor& cursor) {
           appendPair(pairs[k], bodies, domain, materials, settings, part, cursor);
         });
-    merge(used, bodies, materials, out);
+    merge(used, bodies, domain, materials, settings, out);
   }
 
  private:
@@ -91,16 +91,6 @@ class NarrowPhase {
   struct Cursor {
     std::size_t place = 0;
     bool placed = false;
-  };
-
-  /// A pair that is a contact: half of what one takes, as it is written and read once more.
-  struct Hit {
-    Pair pair;
-    Vector3<S> normal;
-    S gap;
-    S arm1;
-    S arm2;
-    Vector3<S> drift;
   };
 
   /// Calls append(k, part, cursor) for k = 0 … n-1 in chunks. \return their number
@@ -126,9 +116,11 @@ class NarrowPhase {
     return {bodies.ids()[pair.first], bodies.ids()[pair.second]};
   }
 
-  /// Pairs and boundaries in the order of keys, part by part.
+  /// Pairs and boundaries in the order of keys, part by part. The geometry of pairs is found once more: that
+  /// is less than to keep it meanwhile.
   template <class B>
-  void merge(std::size_t used, const B& bodies, std::span<const Material<S>> materials,
+  void merge(std::size_t used, const B& bodies, const Domain<S>& domain,
+             std::span<const Material<S>> materials, const NarrowPhaseSettings<S>& settings,
              std::vector<Contact<S>>& out) {
     const auto before = [](const Contact<S>& wall, const ContactKeys& keys) {
       return ContactKeys{wall.key1, wall.key2} < keys;
@@ -138,7 +130,7 @@ class NarrowPhase {
       Start next = starts_.back();
       if (!parts_[p].empty()) {
         const auto end = std::lower_bound(boundaryContacts_.begin(), boundaryContacts_.end(),
-                                          keysOf(parts_[p].back().pair, bodies), before);
+                                          keysOf(parts_[p].back(), bodies), before);
         next.wall = static_cast<std::size_t>(end - boundaryContacts_.begin());
         next.place += parts_[p].size() + next.wall - starts_.back().wall;
       }
@@ -148,19 +140,29 @@ class NarrowPhase {
     out.resize(last.place + boundaryContacts_.size() - last.wall);
     parallelForTasks<Share::Alike>(used, [&](std::size_t p) {
       auto [wall, place] = starts_[p];
-      for (const Hit& hit : parts_[p]) {
-        const auto [i, j] = hit.pair;
-        const ContactKeys keys = keysOf(hit.pair, bodies);
+      for (const Pair& pair : parts_[p]) {
+        const auto [i, j] = pair;
+        const ContactKeys keys = keysOf(pair, bodies);
         while (wall < starts_[p + 1].wall && before(boundaryContacts_[wall], keys)) {
           out[place++] = boundaryContacts_[wall++];
         }
+        Vector3<S> drift;
+        const Vector3<S> r_ij = separation(pair, domain, settings, drift);
+        const S reach = spheres_[i].r + spheres_[j].r;
+        const Touch<S> touch = touchAt<S>(r_ij, detail::safeNorm(r_ij), spheres_[i].r, reach, keys.first,
+                                          keys.second, settings.epsilon);
         const std::uint32_t m_i = bodies.materials()[i];
         const std::uint32_t m_j = bodies.materials()[j];
-        out[place++] = Contact<S>{
-            i,           j,          keys.first,
-            keys.second, hit.normal, hit.gap,
-            hit.arm1,    hit.arm2,   m_i == m_j ? materials[m_i] : mix(materials[m_i], materials[m_j]),
-            hit.drift};
+        out[place++] = Contact<S>{i,
+                                  j,
+                                  keys.first,
+                                  keys.second,
+                                  touch.normal,
+                                  touch.gap,
+                                  touch.arm1,
+                                  touch.arm2,
+                                  m_i == m_j ? materials[m_i] : mix(materials[m_i], materials[m_j]),
+                                  drift};
       }
     });
     std::copy(boundaryContacts_.begin() + static_cast<std::ptrdiff_t>(last.wall), boundaryContacts_.end(),
@@ -192,16 +194,15 @@ class NarrowPhase {
     if (!settings.resting) {
       return true;
     }
-    const std::span<const ContactKeys> resting = *settings.resting;
-    if (!cursor.placed || (cursor.place > 0 && !(resting[cursor.place - 1] < keys))) {
-      cursor.place =
-          static_cast<std::size_t>(std::lower_bound(resting.begin(), resting.end(), keys) - resting.begin());
+    const std::span<const ContactName> resting = *settings.resting;
+    if (!cursor.placed || (cursor.place > 0 && !(resting[cursor.place - 1].keys < keys))) {
+      cursor.place = static_cast<std::size_t>(placeOf(resting, keys) - resting.begin());
       cursor.placed = true;
     }
-    while (cursor.place < resting.size() && resting[cursor.place] < keys) {
+    while (cursor.place < resting.size() && resting[cursor.place].keys < keys) {
       ++cursor.place;
     }
-    return cursor.place < resting.size() && resting[cursor.place] == keys;
+    return cursor.place < resting.size() && resting[cursor.place].keys == keys;
   }
 
   static const Material<S>& surface(std::span<const Material<S>> materials, std::uint32_t id) {
@@ -212,18 +213,24 @@ class NarrowPhase {
     return materials[id];
   }
 
-  template <class B>
-  void appendPair(Pair pair, const B& bodies, const Domain<S>& domain, std::span<const Material<S>> materials,
-                  const NarrowPhaseSettings<S>& settings, std::vector<Hit>& part, Cursor& cursor) const {
-    const std::uint32_t i = pair.first;
-    const std::uint32_t j = pair.second;
-    Vector3<S> r_ij = spheres_[j].x - spheres_[i].x;
-    Vector3<S> drift = Vector3<S>::Zero();
+  /// From the first centre to the nearest image of the second, which moves on by `drift` more.
+  Vector3<S> separation(Pair pair, const Domain<S>& domain, const NarrowPhaseSettings<S>& settings,
+                        Vector3<S>& drift) const {
+    Vector3<S> r_ij = spheres_[pair.second].x - spheres_[pair.first].x;
+    drift = Vector3<S>::Zero();
     if (!domain.isOpen()) {
       domain.minimumImage(r_ij, drift, settings.time);
     }
-    const S r_i = spheres_[i].r;
-    const S reach = r_i + spheres_[j].r;
+    return r_ij;
+  }
+
+  template <class B>
+  void appendPair(Pair pair, const B& bodies, const Domain<S>& domain, std::span<const Material<S>> materials,
+                  const NarrowPhaseSettings<S>& settings, std::vector<Pair>& part, Cursor& cursor) const {
+    const auto [i, j] = pair;
+    Vector3<S> drift;
+    const Vector3<S> r_ij = separation(pair, domain, settings, drift);
+    const S reach = spheres_[i].r + spheres_[j].r;
     const S far = reach + widestMargin(settings, reach);
     if (r_ij.squaredNorm() > far * far) {
       return;  // the common case, before anything else is loaded
@@ -238,14 +245,12 @@ class NarrowPhase {
         !(detail::isMovable(bodies, i) || detail::isMovable(bodies, j))) {
       return;
     }
-    const ContactKeys keys = keysOf(pair, bodies);
-    if (!overlaps && !mayRest(settings, keys, cursor)) {
+    if (!overlaps && !mayRest(settings, keysOf(pair, bodies), cursor)) {
       return;
     }
     (void)surface(materials, bodies.materials()[i]);  // refused while the list is what it was
     (void)surface(materials, bodies.materials()[j]);
-    const Touch<S> touch = touchAt<S>(r_ij, distance, r_i, reach, keys.first, keys.second, settings.epsilon);
-    part.push_back({pair, touch.normal, touch.gap, touch.arm1, touch.arm2, drift});
+    part.push_back(pair);
   }
 
   template <class B>
@@ -285,7 +290,7 @@ class NarrowPhase {
   };
 
   std::vector<Sphere> spheres_;
-  std::vector<std::vector<Hit>> parts_;
+  std::vector<std::vector<Pair>> parts_;
   std::vector<std::vector<Contact<S>>> wallParts_;
   std::vector<Start> starts_;
   std::vector<Contact<S>> boundaryContacts_;

@@ -20,7 +20,8 @@ struct CorrectionSettings {
   Scalar tolerance =
       Scalar(1e-3);  ///< [1] > 0: sweeps end when the largest move is this times the largest overlap
   /// [1] >= 0: overlaps that are right to this times the smallest radius of a contact are right; nothing is
-  /// moved while all are.
+  /// moved while all are, and where some are not, those below a 16th of it stay unless others are pressed
+  /// into them.
   Scalar precision = Scalar(1e-4);
   int maxIterations = 20;  ///< >= 1
   /// A pair that is moved apart keeps its angular momentum: it turns the slower. Off: velocities stay.
@@ -45,8 +46,9 @@ struct CorrectionReport {
 /// Nonlinear projected Gauss-Seidel over the colours of the contacts: in turn each contact that is still
 /// closer than it should be is opened along its present normal, by inverse mass, so that the common centre of
 /// mass of movable bodies stays to rounding. Distances are recomputed from the moved positions; only relative
-/// displacements enter, so that a place far from the origin costs no digits. After the first sweep a contact
-/// is passed over while its bodies have moved since by less than half of what ends the sweeps.
+/// displacements enter, so that a place far from the origin costs no digits. A contact is passed over while
+/// its bodies have moved by less than half of what ends the sweeps since it was opened, or at all where its
+/// overlap is hardly any: so one ball wedged into a heap costs what its surroundings cost.
 ///
 /// Two free spheres that are moved apart from r to r + d would gain the angular momentum m* d x v of their
 /// relative velocity v. As on an orbit, the part of v across r becomes v_t r/(r + d) instead: momentum and
@@ -70,22 +72,28 @@ class PositionalCorrection {
       return report;
     }
     takeUp(colouring, bodies);
-    rows_.resize(contacts.size());
     const S enough = std::max<S>(settings.tolerance * all.overlap, right);
-    watch_.begin(shifts_.size(), rows_.size(), S(enough / S(2)));
+    watch_.begin(shifts_.size(), contacts.size(), S(enough / S(2)));
+    rows_.resize(contacts.size());
+    filled_.assign(contacts.size(), 0);
+    deep_.resize(contacts.size());
+    parallelFor(contacts.size(), chunk,
+                [&](std::size_t c) { deep_[c] = -contacts[c].gap > right / S(16) ? 1 : 0; });
+    parallelFor(contacts.size(), chunk,
+                [&](std::size_t k) { watch_.enterFirst(k, deep_[colouring.rows()[k].contact] == 0); });
     do {
       // Lone contacts are right after one sweep.
       const auto one = [&](std::size_t k, Opened& sum) {
-        if (report.iterations == 0) {
-          if (k + lookAhead < rows_.size()) {
-            detail::prefetch(contacts[colouring.rows()[k + lookAhead].contact]);
-          }
-          fill(k, contacts, colouring, bodies, settings);
+        const ContactColoring::Row& place = colouring.rows()[k];
+        if (!watch_.isStale(k, place.slot1, place.slot2)) {
+          return;
         }
-        if (report.iterations == 0 || watch_.isStale(k)) {
-          open(k, settings.keepAngularMomentum, sum);
-          watch_.enter(k, rows_[k].slot1, rows_[k].slot2);
+        if (filled_[k] == 0) {
+          filled_[k] = 1;
+          fill(rows_[k], contacts[place.contact], place, bodies, settings);
         }
+        open(rows_[k], place, settings.keepAngularMomentum, sum);
+        watch_.enter(k, place.slot1, place.slot2);
       };
       Opened opened = detail::sumOverRows(0, colouring.loneCount(), Opened{}, one);
       opened += detail::sumOverColours(colouring, Opened{}, one);
@@ -120,17 +128,13 @@ class PositionalCorrection {
     Vector3<S> dv;  ///< that v was changed by
   };
   struct Row {
-    Vector3<S> r;  ///< from the first centre to the second at detection; to a boundary: its normal
-    Vector3<S> n;
-    S reach;  ///< distance at which the overlap is what shall remain
+    Vector3<S> n;  ///< from the first centre to the second at detection
+    S distance;    ///< of the centres then; < 0 to a boundary
+    S reach;       ///< distance at which the overlap is what shall remain; to a boundary the way to there
     S share1;
     S share2;
-    std::uint32_t slot1;
-    std::uint32_t slot2;
-    bool boundary;
   };
   static constexpr std::size_t chunk = 512;
-  static constexpr std::size_t lookAhead = 8;
 
   /// The largest overlap, and the smallest radius.
   struct Extremes {
@@ -186,42 +190,32 @@ class PositionalCorrection {
   }
 
   template <class B>
-  void fill(std::size_t k, std::span<const Contact<S>> contacts, const ContactColoring& colouring,
-            const B& bodies, const CorrectionSettings<S>& settings) {
-    const ContactColoring::Row& place = colouring.rows()[k];
-    const Contact<S>& c = contacts[place.contact];
+  void fill(Row& row, const Contact<S>& c, const ContactColoring::Row& place, const B& bodies,
+            const CorrectionSettings<S>& settings) const {
     const S overlap = -c.gap;
-    const bool boundary = c.second == staticPartner;
     const S kept =
         std::max<S>(overlap - settings.cap * smallerRadius(c, bodies),
                     std::max<S>((S(1) - settings.factor) * overlap, std::min<S>(settings.slop, overlap)));
     const S m1 = shifts_[place.slot1].mass;
     const S m2 = shifts_[place.slot2].mass;
     const MassShares<S> shares = massShares<S>(m1, m1 > S(0), m2, m2 > S(0));
+    const bool boundary = c.second == staticPartner;
     const S distance = boundary ? S(0) : c.arm1 + c.arm2;
-    // To a boundary `reach` is the travel along the normal that remains to be made.
-    rows_[k] = Row{Vector3<S>(distance * c.normal),
-                   c.normal,
-                   boundary ? S(overlap - kept) : S(distance - c.gap - kept),
-                   shares.first,
-                   shares.second,
-                   place.slot1,
-                   place.slot2,
-                   boundary};
+    row = {c.normal, boundary ? S(-1) : distance, S(distance - c.gap - kept), shares.first, shares.second};
   }
 
-  [[gnu::flatten]] void open(std::size_t k, bool keepAngularMomentum, Opened& sum) {
-    const Row& row = rows_[k];
-    Shift& b1 = shifts_[row.slot1];
-    Shift& b2 = shifts_[row.slot2];
+  [[gnu::flatten]] void open(const Row& row, const ContactColoring::Row& place, bool keepAngularMomentum,
+                             Opened& sum) {
+    Shift& b1 = shifts_[place.slot1];
+    Shift& b2 = shifts_[place.slot2];
     const Vector3<S> d = b2.d - b1.d;
     Vector3<S> n = row.n;
     S missing(0);
     S distance(0);
-    if (row.boundary) {
+    if (row.distance < S(0)) {
       missing = row.reach - n.dot(d);
     } else {
-      const Vector3<S> r = row.r + d;
+      const Vector3<S> r = row.distance * n + d;
       if (r.squaredNorm() > row.reach * row.reach) {
         return;  // far enough, unless squares underflow
       }
@@ -245,18 +239,20 @@ class PositionalCorrection {
     }
     if (row.share1 > S(0)) {  // immovable bodies are shared between threads: never written
       b1.d -= (row.share1 * missing) * n;
-      watch_.move(row.slot1, row.share1 * missing);
+      watch_.move(place.slot1, row.share1 * missing);
     }
     if (row.share2 > S(0)) {
       b2.d += (row.share2 * missing) * n;
-      watch_.move(row.slot2, row.share2 * missing);
+      watch_.move(place.slot2, row.share2 * missing);
     }
     sum += opened;
   }
 
   std::vector<Shift> shifts_;
   detail::RowWatch<S> watch_;
-  std::vector<Row> rows_;
+  std::vector<std::uint8_t> deep_;  ///< by contact: more than hardly any overlap
+  std::vector<Row> rows_;           ///< those that are `filled_`
+  std::vector<std::uint8_t> filled_;
   std::vector<Displacement<S>> moved_;
 };
 

@@ -20,7 +20,7 @@ class RowWatch {
   void begin(std::size_t slots, std::size_t rows, const S& still) {
     still_ = still;
     ways_.assign(slots, S(0));
-    rows_.resize(rows);
+    then_.resize(rows);
   }
 
   const S& still() const { return still_; }
@@ -30,24 +30,19 @@ class RowWatch {
 
   /// Row k, between these two, is right now.
   void enter(std::size_t k, std::uint32_t slot1, std::uint32_t slot2) {
-    rows_[k] = {slot1, slot2, ways_[slot1] + ways_[slot2]};
+    then_[k] = ways_[slot1] + ways_[slot2];
   }
+  /// Nothing has moved yet; row k is right, or else stale.
+  void enterFirst(std::size_t k, bool isRight) { then_[k] = isRight ? S(0) : S(-1) - still_; }
 
-  bool isStale(std::size_t k) const {
-    const Row& row = rows_[k];
-    return ways_[row.slot1] + ways_[row.slot2] > row.way + still_;
+  bool isStale(std::size_t k, std::uint32_t slot1, std::uint32_t slot2) const {
+    return ways_[slot1] + ways_[slot2] > then_[k] + still_;
   }
 
  private:
-  struct Row {
-    std::uint32_t slot1;
-    std::uint32_t slot2;
-    S way;
-  };
-
   S still_ = S(0);
-  std::vector<S> ways_;
-  std::vector<Row> rows_;
+  std::vector<S> ways_;  ///< by slot
+  std::vector<S> then_;  ///< by row: of its two when it was right
 };
 
 }  // namespace gravel::detail

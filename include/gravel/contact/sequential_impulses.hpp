@@ -65,7 +65,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     while (true) {
       const Progress now = detail::sumOverColours(colouring, Progress{}, [&](std::size_t k, Progress& sum) {
         if (local) {
-          relaxStale(problem, k, sum);
+          relaxStale(problem, colouring.rows()[k], k, sum);
         } else {
           relaxNext(problem, k, momentum.beta, report.iterations == 0 || !accelerate, sum);
         }
@@ -200,8 +200,9 @@ class SequentialImpulses : private detail::RowImpulses<S> {
   }
 
   /// A row, unless its ends stand nearly as they did when it was right.
-  void relaxStale(ContactProblem<S>& problem, std::size_t k, Progress& sum) {
-    if (watch_.isStale(k)) {
+  void relaxStale(ContactProblem<S>& problem, const ContactColoring::Row& ends, std::size_t k,
+                  Progress& sum) {
+    if (watch_.isStale(k, ends.slot1, ends.slot2)) {
       relax<true>(problem, k, S(0), sum);
       ++sum.looked;
     }

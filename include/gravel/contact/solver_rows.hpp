@@ -35,6 +35,14 @@ struct alignas(rowAlignment<S>) SolverBody {
   S spin;        ///< 1/(k m)
 };
 
+/// A body before any impulse, with how fast it falls.
+template <Real S>
+struct alignas(rowAlignment<S>) SolverStart {
+  Vector3<S> v;
+  S fall;  ///< [m s^-2] its acceleration; 0 of what nothing moves
+  Vector3<S> s;
+};
+
 /// The largest speed, and the masses > 0.
 template <Real S>
 struct ProblemScales {
@@ -82,7 +90,10 @@ struct TurningRow {
   Vector3<S> l = Vector3<S>::Zero();
   Vector3<S> step = Vector3<S>::Zero();
 
-  Vector3<S> rho(const SolverBody<S>& b1, const SolverBody<S>& b2) const { return q2 * b2.s - q1 * b1.s; }
+  template <class B>
+  Vector3<S> rho(const B& b1, const B& b2) const {
+    return q2 * b2.s - q1 * b1.s;
+  }
 };
 
 /// 1/x; 0 of 0. Not `inverse`, a name by which Eigen would take its own scalars for arrays.
@@ -118,7 +129,8 @@ template <Real S>
   using std::sqrt;
   RowGuess<S> guess{jn};
   if (row.stick > S(0)) {
-    guess.u = (jt - row.n.dot(jt) * row.n) / row.tangentialMass;
+    const S mobility = S(1) / row.tangentialMass;  // waits for no impulse
+    guess.u = mobility * Vector3<S>(jt - row.n.dot(jt) * row.n);
     const S size_sq = guess.u.squaredNorm();
     const S stick = row.stick * jn;
     if (size_sq > stick * stick) {
@@ -128,15 +140,13 @@ template <Real S>
   return guess;
 }
 
-template <Real S>
-[[gnu::always_inline]] inline S normalVelocity(const SolverRow<S>& row, const SolverBody<S>& b1,
-                                               const SolverBody<S>& b2) {
+template <Real S, class B>
+[[gnu::always_inline]] inline S normalVelocity(const SolverRow<S>& row, const B& b1, const B& b2) {
   return row.n.dot(Vector3<S>(b2.v - b1.v));
 }
 
-template <Real S>
-[[gnu::always_inline]] inline Vector3<S> slipVelocity(const SolverRow<S>& row, const SolverBody<S>& b1,
-                                                      const SolverBody<S>& b2) {
+template <Real S, class B>
+[[gnu::always_inline]] inline Vector3<S> slipVelocity(const SolverRow<S>& row, const B& b1, const B& b2) {
   const Vector3<S> v_rel = b2.v - b1.v;
   return v_rel - row.n.dot(v_rel) * row.n - Vector3<S>(row.c1 * b1.s + row.c2 * b2.s).cross(row.n);
 }

@@ -264,15 +264,18 @@ class ContactStage {
   /// For the next h [s]. Nothing where all are to be looked at.
   std::optional<std::span<const std::uint32_t>> nearBoundaries(const Bodies& bodies, const Scalar& h);
 
+  /// contacts() by name.
+  std::span<const ContactName> names();
+
   /// Who was in contact at the step's start, or came to rest in it.
-  void rememberResting();
+  std::span<const ContactName> resting();
 
   std::vector<HalfSpace<Scalar>> walls_;
   NeighbourList<Scalar> neighbours_;
   BoundaryList<Scalar> nearWalls_;
   NarrowPhase<Scalar> narrow_;
   ImpactEvents<Scalar> impacts_;
-  std::vector<ContactKeys> resting_;
+  std::vector<ContactName> names_;
   mutable std::vector<ContactKeys> struck_;
   Scalar margin_ = Scalar(0);  // of the neighbours: what rests may have a gap
   bool searched_ = false;      // neighbours_ hold for the whole drift
@@ -283,9 +286,10 @@ class ContactStage {
   Scalar separationLoss_ = Scalar(0);
   bool idle_ = false;
   bool moved_ = false;
-  bool acted_ = false;       // the last solve changed velocities
-  bool firstActed_ = false;  // so did that of the first half of this part, or of the last one
-  bool coloured_ = false;    // solver_ knows the present contacts
+  std::vector<std::uint8_t> wasMoved_;  // by body: in the last separation
+  bool acted_ = false;                  // the last solve changed velocities
+  bool firstActed_ = false;             // so did that of the first half of this part, or of the last one
+  bool coloured_ = false;               // solver_ knows the present contacts
 };
 
 }  // namespace gravel

@@ -13,10 +13,10 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
                                           const Scalar& h, bool goesOn, Profiler& profiler) {
   const bool searched = searched_;
   searched_ = false;
-  coloured_ = false;
   const char* reason = reasonToSkip(bodies);
   if (reason != nullptr) {
     contacts_.clear();
+    coloured_ = false;
     profiler.skip(Phase::NeighbourSearch, reason);
     profiler.skip(Phase::NarrowPhase, reason);
     return;
@@ -27,14 +27,15 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
   prepareSurfaces(config);
   NarrowPhaseSettings<Scalar> settings{time, config.epsilon, Scalar(0), h};
   if (!goesOn) {
+    coloured_ = false;
     const Profiler::Scope scope(profiler, Phase::NarrowPhase);
     narrow_.find(neighbours_.pairs(), bodies, domain, materials.entries(), walls_, settings, contacts_,
                  nearBoundaries(bodies, Scalar(0)));
     return;
   }
-  rememberResting();
-  settings.resting = resting_;
-  if (searched && resting_.empty() && report_.postponed == 0) {
+  settings.resting = resting();
+  coloured_ = false;
+  if (searched && settings.resting->empty() && report_.postponed == 0) {
     contacts_.clear();
     profiler.skip(Phase::NarrowPhase, "all that met on the way parted again");
     return;
@@ -131,8 +132,15 @@ auto ContactStage<Scalar, Layout>::allTouches() const -> Touches {
 template <Real Scalar, class Layout>
 void ContactStage<Scalar, Layout>::renewGeometry(const Bodies& bodies, const Config& config,
                                                  const Scalar& time) {
+  wasMoved_.assign(bodies.size(), 0);
+  for (const Displacement<Scalar>& d : solver_.displacements()) {
+    wasMoved_[d.body] = 1;
+  }
   parallelFor(contacts_.size(), 1024, [&](std::size_t k) {
     Contact<Scalar>& c = contacts_[k];
+    if (wasMoved_[c.first] == 0 && (c.second == staticPartner || wasMoved_[c.second] == 0)) {
+      return;
+    }
     const Vector3<Scalar> x1 = bodies.positions()[c.first];
     const Scalar r1 = bodies.radii()[c.first];
     if (c.second == staticPartner) {
@@ -182,7 +190,7 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
                                         config.epsilon};
   const std::span<const Material<Scalar>> surfaces(materials.entries());
   const std::span<const HalfSpace<Scalar>> walls(walls_);
-  const std::span<const Contact<Scalar>> held(contacts_);
+  const std::span<const ContactName> held = names();
   ImpactReport<Scalar> blows;
   if (collisionHook) {
     const auto decide = [&](const Impact<Scalar>& impact, const Material<Scalar>& material,
@@ -256,22 +264,38 @@ std::optional<std::span<const std::uint32_t>> ContactStage<Scalar, Layout>::near
 }
 
 template <Real Scalar, class Layout>
-void ContactStage<Scalar, Layout>::rememberResting() {
-  resting_.resize(contacts_.size());
-  parallelFor(contacts_.size(), 4096, [&](std::size_t k) {
-    resting_[k] = {contacts_[k].key1, contacts_[k].key2};
-  });
-  const auto old = static_cast<std::ptrdiff_t>(resting_.size());
-  for (const Impact<Scalar>& impact : impacts_.impacts()) {
+std::span<const ContactName> ContactStage<Scalar, Layout>::names() {
+  if (coloured_) {
+    return solver_.names();
+  }
+  names_.resize(contacts_.size());
+  parallelFor(contacts_.size(), 4096, [&](std::size_t k) { names_[k] = ContactName::of(contacts_[k]); });
+  return names_;
+}
+
+template <Real Scalar, class Layout>
+std::span<const ContactName> ContactStage<Scalar, Layout>::resting() {
+  const std::span<const ContactName> held = names();
+  const auto rests = [](const Impact<Scalar>& impact) { return impact.rests; };
+  const std::vector<Impact<Scalar>>& all = impacts_.impacts();
+  if (std::none_of(all.begin(), all.end(), rests)) {
+    return held;
+  }
+  if (held.data() != names_.data()) {
+    names_.assign(held.begin(), held.end());
+  }
+  const auto old = static_cast<std::ptrdiff_t>(names_.size());
+  for (const Impact<Scalar>& impact : all) {
     if (impact.rests) {
-      resting_.push_back({impact.key1, impact.key2});
+      names_.push_back({{impact.key1, impact.key2}, impact.first, impact.second});
     }
   }
-  if (static_cast<std::ptrdiff_t>(resting_.size()) > old) {
-    std::sort(resting_.begin() + old, resting_.end());
-    std::inplace_merge(resting_.begin(), resting_.begin() + old, resting_.end());
-    resting_.erase(std::unique(resting_.begin(), resting_.end()), resting_.end());
-  }
+  const auto before = [](const ContactName& a, const ContactName& b) { return a.keys < b.keys; };
+  std::sort(names_.begin() + old, names_.end(), before);
+  std::inplace_merge(names_.begin(), names_.begin() + old, names_.end(), before);
+  const auto same = [](const ContactName& a, const ContactName& b) { return a.keys == b.keys; };
+  names_.erase(std::unique(names_.begin(), names_.end(), same), names_.end());
+  return names_;
 }
 
 }  // namespace gravel

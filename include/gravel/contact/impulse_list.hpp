@@ -1,0 +1,85 @@
+#pragma once
+
+/// \file
+/// The impulses of many contacts, in little room.
+
+#include <gravel/contact/contact_settings.hpp>
+#include <gravel/core/parallel.hpp>
+
+#include <cstdint>
+#include <vector>
+
+namespace gravel::detail {
+
+/// Impulses by number; those against rolling and spinning take room only where there are such. Different
+/// numbers may be written at the same time.
+template <Real S>
+class ImpulseList {
+ public:
+  std::size_t size() const { return pushes_.size(); }
+
+  /// As many, of any value. \param turns whether any of them resists rolling or spinning
+  void resize(std::size_t count, bool turns) {
+    pushes_.resize(count);
+    impacts_.resize(count);
+    turning_.resize(turns ? count : 0);
+  }
+
+  /// As many, all zero.
+  void clear(std::size_t count) {
+    pushes_.assign(count, Push{});
+    impacts_.assign(count, 0);
+    turning_.clear();
+  }
+
+  bool turns() const { return !turning_.empty(); }
+  const S& normal(std::size_t k) const { return pushes_[k].normal; }
+  const Vector3<S>& tangential(std::size_t k) const { return pushes_[k].tangential; }
+  Vector3<S> turning(std::size_t k) const {
+    return turning_.empty() ? Vector3<S>(Vector3<S>::Zero()) : turning_[k];
+  }
+
+  ContactImpulse<S> get(std::size_t k) const {
+    return {pushes_[k].normal, pushes_[k].tangential, turning(k), impacts_[k] != 0};
+  }
+
+  /// What resists turning is left out unless the list turns().
+  void set(std::size_t k, const ContactImpulse<S>& j) {
+    pushes_[k] = {j.normal, j.tangential};
+    impacts_[k] = j.impact ? 1 : 0;
+    if (!turning_.empty()) {
+      turning_[k] = j.turning;
+    }
+  }
+
+  /// Entry k as entry placeOf(k) of another list of this length.
+  template <class PlaceOf>
+  ImpulseList moved(PlaceOf&& placeOf) const {
+    ImpulseList all;
+    all.resize(size(), turns());
+    parallelFor(size(), chunk, [&](std::size_t k) { all.set(placeOf(k), get(k)); });
+    return all;
+  }
+
+  std::vector<ContactImpulse<S>> listed() const {
+    std::vector<ContactImpulse<S>> all(size());
+    parallelFor(size(), chunk, [&](std::size_t k) { all[k] = get(k); });
+    return all;
+  }
+
+  void prefetch(std::size_t k) const { __builtin_prefetch(&pushes_[k]); }
+
+ private:
+  static constexpr std::size_t chunk = 512;
+
+  struct Push {
+    S normal = S(0);
+    Vector3<S> tangential = Vector3<S>::Zero();
+  };
+
+  std::vector<Push> pushes_;
+  std::vector<std::uint8_t> impacts_;
+  std::vector<Vector3<S>> turning_;  ///< empty where nothing turns
+};
+
+}  // namespace gravel::detail
