@@ -97,6 +97,11 @@ TEST_CASE("Every setter refuses NaN, infinities and what is out of range, and le
        [](const auto& s) { return s.getPositionalCorrectionFactor(); },
        1.0,
        {-0.1, 1.1}},
+      {"contactTolerance",
+       [](auto& s, double x) { s.setContactTolerance(x); },
+       [](const auto& s) { return s.getContactTolerance(); },
+       1e-5,
+       {0.0, -1e-3, 1.5}},
   };
   for (const Row& row : rows) {
     CAPTURE(row.name);
@@ -113,6 +118,14 @@ TEST_CASE("Every setter refuses NaN, infinities and what is out of range, and le
       CHECK(row.get(space) == row.good);
     }
   }
+}
+
+TEST_CASE("The most contact sweeps can be set between steps, to 1 and more") {
+  Space<double> space;
+  space.setContactIterations(7);
+  CHECK_THROWS_WITH(space.setContactIterations(0), ContainsSubstring("contactIterations"));
+  CHECK(space.getContactIterations() == 7);
+  CHECK(space.config().contactIterations == 7);
 }
 
 TEST_CASE("validate lists every field at fault at once, with value and range") {

@@ -53,6 +53,14 @@ class Settings {
     assign(&SimulationConfig<Scalar>::positionalCorrectionFactor, factor);
   }
 
+  Scalar getContactTolerance() const { return config_.contactTolerance; }
+  void setContactTolerance(Scalar tolerance) {
+    assign(&SimulationConfig<Scalar>::contactTolerance, tolerance);
+  }
+
+  std::size_t getContactIterations() const { return config_.contactIterations; }
+  void setContactIterations(std::size_t most) { assign(&SimulationConfig<Scalar>::contactIterations, most); }
+
   bool isDiagnosticsEnabled() const { return config_.diagnosticsEnabled; }
   void setDiagnosticsEnabled(bool enabled) { config_.diagnosticsEnabled = enabled; }
 
