@@ -227,7 +227,8 @@ class NarrowPhase {
   template <class B>
   void appendPair(Pair pair, const B& bodies, const Domain<S>& domain, std::span<const Material<S>> materials,
                   const NarrowPhaseSettings<S>& settings, std::vector<Pair>& part, Cursor& cursor) const {
-    const auto [i, j] = pair;
+    const std::uint32_t i = pair.first;
+    const std::uint32_t j = pair.second;
     Vector3<S> drift;
     const Vector3<S> r_ij = separation(pair, domain, settings, drift);
     const S reach = spheres_[i].r + spheres_[j].r;
