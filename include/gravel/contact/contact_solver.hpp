@@ -68,8 +68,7 @@ class ContactSolver {
     kinds_ = found.kinds;
     // The same pairs of the same bodies: colours, and who is remembered, stay.
     if (!asMany || found.others > 0 || !sameMovable(bodies)) {
-      before_ = inRows_ ? rowImpulses_.moved([&](std::size_t r) { return coloring_.rows()[r].contact; })
-                        : std::move(restored_);
+      before_ = inRows_ ? inOrder(rowImpulses_) : std::move(restored_);
       namesBefore_.swap(names_);
       coloring_.build(contacts, bodies);
       handOn(contacts);
@@ -147,7 +146,7 @@ class ContactSolver {
   }
   /// The same as a copy.
   std::vector<ContactImpulse<S>> copyImpulses() const {
-    return inRows_ ? inOrder(rowImpulses_) : restored_.listed();
+    return inRows_ ? inOrder(rowImpulses_).listed() : restored_.listed();
   }
 
   /// sum J.(dv_2 - dv_1) of the last solve(), along the normals and across [J]: what its impulses do to
@@ -178,7 +177,7 @@ class ContactSolver {
   /// Of the solve before the last one, whose contacts may have been others, in the order of their keys.
   const ContactKeys& earlierKeys(std::size_t k) const { return (sameNames_ ? names_ : namesBefore_)[k].keys; }
   std::vector<ContactImpulse<S>> earlierImpulses() const {
-    return sameNames_ ? inOrder(rowsBefore_) : before_.listed();
+    return sameNames_ ? inOrder(rowsBefore_).listed() : before_.listed();
   }
 
   /// What the next solve() begins from: the impulses of the last one by keys, and its step [s]. A restart
@@ -197,7 +196,7 @@ class ContactSolver {
   /// \param memory sorted by keys
   void setMemory(const std::vector<StoredImpulse<S>>& memory, const S& step) {
     if (sameNames_) {
-      before_ = rowsBefore_.moved([&](std::size_t r) { return coloring_.rows()[r].contact; });
+      before_ = inOrder(rowsBefore_);
       namesBefore_.swap(names_);
       sameNames_ = false;
     }
@@ -242,11 +241,8 @@ class ContactSolver {
   }
 
   /// From the order of rows to that of contacts.
-  std::vector<ContactImpulse<S>> inOrder(const detail::ImpulseList<S>& ofRows) const {
-    std::vector<ContactImpulse<S>> all(ofRows.size());
-    parallelFor(ofRows.size(), chunk,
-                [&](std::size_t r) { all[coloring_.rows()[r].contact] = ofRows.get(r); });
-    return all;
+  detail::ImpulseList<S> inOrder(const detail::ImpulseList<S>& ofRows) const {
+    return ofRows.moved([&](std::size_t r) { return coloring_.rows()[r].contact; });
   }
 
   /// What `before_` holds of these contacts goes to their rows.

@@ -67,8 +67,6 @@ class ImpulseList {
     return all;
   }
 
-  void prefetch(std::size_t k) const { __builtin_prefetch(&pushes_[k]); }
-
  private:
   static constexpr std::size_t chunk = 512;
 
