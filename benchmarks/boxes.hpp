@@ -28,7 +28,8 @@ struct Scene {
   double g = 0;
   double e = 0;
   double mu = 0;
-  double h = 1.0 / 60;  ///< step
+  bool smoothSides = false;  ///< no friction at upright walls
+  double h = 1.0 / 60;       ///< step
 
   /// Half-spaces: inward normals and offsets.
   std::vector<std::pair<Vec, double>> planes() const {
@@ -95,8 +96,10 @@ gravel::Space<S> spaceOf(const Scene& scene, gravel::SimulationConfig<S> config)
   config.coeffRestitution = static_cast<S>(scene.e);
   config.coeffFriction = config.coeffStaticFriction = static_cast<S>(scene.mu);
   gravel::Space<S> space(config);
+  const gravel::MaterialId smooth = space.addMaterial({.staticFriction = S(0), .kineticFriction = S(0)});
   for (const auto& [normal, offset] : scene.planes()) {
-    space.addPlane(normal.template cast<S>(), static_cast<S>(offset));
+    space.addPlane(normal.template cast<S>(), static_cast<S>(offset),
+                   scene.smoothSides && normal[2] == 0 ? smooth : gravel::defaultMaterial);
   }
   space.setUniformField({0, 0, static_cast<S>(-scene.g)});
   for (const gravel::Body<double>& body : scene.bodies) {

@@ -1,19 +1,21 @@
 /// How the cost of contacts grows: time and memory of heaps from 1e3 bodies on, and of one large sphere on a
 /// bed of small ones, with the errors beside them.
 ///
-///   layers   8 layers of equal spheres, each in the hollows of the one below, between walls: the wider, the
-///   more;
-///            from the places of rest, 40 steps before any is timed
+///   heap     a dropped pile at rest between smooth walls, and its images in them: 1, 9, 100 such heaps
 ///   morton   the same, bodies sorted along a Morton curve (`Space::reorderBodies`)
 ///   mix      radii 1 : 100, masses 1 : 1e6, dropped
 ///   dropped  the pile that the other comparisons use
+///
+/// Heaps come to rest with the sweeps of the defaults; then they go on with those of the comparison with
+/// Bullet, ten steps before any is timed.
 ///
 /// ns/contact: processor time of a step over contacts. ns/sweep: that part of it which solves contacts (share
 /// by the profiler), over contacts and sweeps. B/body: what malloc gave out for a space of as many bodies far
 /// from each other, after two steps; B/contact: the rest, over contacts, candidate pairs included (glibc;
 /// vectors that have grown count with what they hold in reserve).
 ///
-///   bench_contact_growth [fewest bodies] [most bodies] [steps to settle of mix and dropped] [bodies dropped]
+///   bench_contact_growth [bodies of one heap] [most bodies] [steps to settle] [steps of mix and dropped]
+///                        [bodies dropped]
 
 #include "boxes.hpp"
 #include "stopwatch.hpp"
@@ -28,42 +30,41 @@ namespace {
 
 using namespace boxes;
 
-gravel::SimulationConfig<double> config() {
-  gravel::SimulationConfig<double> config;
-  config.contactTolerance = 1e-2;
-  config.contactIterations = 4;
-  return config;
-}
-
 double bytesInUse() {
   const auto info = mallinfo2();
   return static_cast<double>(info.uordblks + info.hblkhd);
 }
 
-/// Even layers hold side x side spheres, odd ones one less a side.
-Scene layers(std::size_t bodies) {
-  constexpr std::size_t high = 8;
-  Scene scene;
-  scene.g = g;
-  scene.mu = 0.5;
-  const auto side = static_cast<std::size_t>(std::sqrt(static_cast<double>(bodies) / high) + 1);
-  const double a = 2.04 * radius;
-  const double rise = std::sqrt(4 * radius * radius - a * a / 2);
-  scene.width = static_cast<double>(side - 1) * a + 2 * radius;
-  gravel::Body<double> grain;
-  grain.radius = radius;
-  grain.mass = 1;
-  for (std::size_t k = 0; k < high; ++k) {
-    const std::size_t n = side - k % 2;
-    const auto at = [&](std::size_t i) {
-      return (static_cast<double>(i) - static_cast<double>(n - 1) / 2) * a;
-    };
-    for (std::size_t i = 0; i < n * n; ++i) {
-      grain.position = {at(i % n), at(i / n), radius + static_cast<double>(k) * rise};
-      scene.bodies.push_back(grain);
-    }
+/// The scene with its bodies where they are after so many steps, without motion.
+Scene rested(Scene scene, std::size_t steps) {
+  gravel::Space<double> space = spaceOf(scene, gravel::SimulationConfig<double>{});
+  for (std::size_t k = 0; k < steps; ++k) {
+    space.computeDynamics(k);
+  }
+  for (std::size_t i = 0; i < space.n(); ++i) {
+    scene.bodies[i].position = space.body(i).position();
   }
   return scene;
+}
+
+/// A heap between smooth walls, and beside it its images in these walls, side x side in all: what leant on a
+/// wall leans on its own image, so that all rest as the one did.
+Scene mirrored(const Scene& one, std::size_t side) {
+  Scene all = one;
+  all.bodies.clear();
+  all.width = one.width * static_cast<double>(side);
+  const auto image = [&](std::size_t place, double x) {
+    const double middle = (static_cast<double>(place) - static_cast<double>(side - 1) / 2) * one.width;
+    return middle + (place % 2 == 0 ? x : -x);
+  };
+  for (std::size_t heap = 0; heap < side * side; ++heap) {
+    for (gravel::Body<double> grain : one.bodies) {
+      grain.position[0] = image(heap % side, grain.position[0]);
+      grain.position[1] = image(heap / side, grain.position[1]);
+      all.bodies.push_back(grain);
+    }
+  }
+  return all;
 }
 
 /// Three layers of small spheres, and the large one above.
@@ -142,26 +143,33 @@ void run(const char* name, const Scene& scene, std::size_t settle, std::size_t s
     }
     apart.width *= 200;
     const double start = bytesInUse();
-    gravel::Space<double> space = spaceOf(apart, config());
+    gravel::Space<double> space = spaceOf(apart, gravel::SimulationConfig<double>{});
     space.computeDynamics(0);
     space.computeDynamics(1);
     perBody = (bytesInUse() - start) / static_cast<double>(space.n());
   }
   const double start = bytesInUse();
-  gravel::Space<double> space = spaceOf(scene, config());
+  gravel::Space<double> space = spaceOf(scene, gravel::SimulationConfig<double>{});
   std::size_t step = 0;
-  while (step < settle) {
-    space.computeDynamics(step++);
-  }
+  const auto go = [&](std::size_t steps) {
+    for (std::size_t k = 0; k < steps; ++k) {
+      space.computeDynamics(step++);
+    }
+  };
+  space.setContactIterations(1000);
+  go(2);  // what is at rest from the start finds its forces
+  space.setContactIterations(gravel::SimulationConfig<double>{}.contactIterations);
+  go(settle);
+  space.setContactTolerance(1e-2);
+  space.setContactIterations(4);
+  go(10);
   const double bodies = static_cast<double>(space.n());
   const double perContact = (bytesInUse() - start - perBody * bodies) /
                             static_cast<double>(std::max<std::size_t>(1, space.contacts().size()));
   measure(name, space, step, steps, perBody, perContact);
   if (reorder) {
     space.reorderBodies();
-    for (int k = 0; k < 3; ++k) {
-      space.computeDynamics(step++);
-    }
+    go(3);
     measure("morton", space, step, steps, perBody, perContact);
   }
 }
@@ -173,15 +181,21 @@ int main(int argc, char** argv) {
     return boxes::argument(argc, argv, i, otherwise, 0);
   };
   omp_set_num_threads(1);
-  const std::size_t fewest = std::max<std::size_t>(1, argument(1, 1000));
+  const std::size_t bodies = std::max<std::size_t>(1, argument(1, 1000));
   const std::size_t most = argument(2, 1000);
-  const std::size_t settle = argument(3, 0);
-  const std::size_t dropped = argument(4, 0);
+  const std::size_t rest = argument(3, 300);
+  const std::size_t settle = argument(4, 0);
+  const std::size_t dropped = argument(5, 0);
   std::printf("%-8s%9s%9s%8s%11s%11s%9s%11s%9s%9s%9s%8s%10s\n", "scene", "bodies", "contacts", "colours",
               "ms/step", "ns/contact", "ns/sweep", "overlap/R", "largest", "KE/NmgR", "weight", "B/body",
               "B/contact");
-  for (std::size_t n = fewest; n <= most; n *= 10) {
-    run("layers", layers(n), 40, n < 1000000 ? 20 : 8, true);
+  Scene heap = pile(bodies, 0);
+  heap.smoothSides = true;
+  heap = rested(heap, rest);
+  for (const std::size_t side : {1, 3, 10, 32}) {
+    if (side == 1 || side * side * bodies <= most) {
+      run("heap", mirrored(heap, side), 20, side * side * bodies < 1000000 ? 20 : 8, true);
+    }
   }
   if (settle > 0) {
     run("mix", mix(), settle, 20, false);

@@ -20,7 +20,8 @@ namespace gravel {
 /// Books the energy of a solved problem. Newton's law of restitution makes energy in some multiple blows with
 /// friction (Kane's paradox) and a residual may do so in any; an island of contacts that gained gets all its
 /// impulses multiplied by the beta < 1 at which it gains nothing. That keeps momentum, angular momentum and
-/// Coulomb's cone.
+/// Coulomb's cone. Islands are joined by contacts whether these push or not: so they stay while the contacts
+/// do, though in a heap at rest some always come to push and others cease.
 template <Real S>
 class ContactEnergy {
  public:
@@ -30,7 +31,6 @@ class ContactEnergy {
               std::span<const Contact<S>> contacts, bool others, ContactReport<S>& report,
               detail::ImpulseList<S>& impulses) {
     terms_.resize(problem.rows.size());
-    pushes_.resize(problem.rows.size());
     known_ = known_ && !others;
     impulses.resize(problem.rows.size(), !problem.turning.empty());
     Sums sums = takeDown(problem, contacts, impulses);
@@ -112,10 +112,9 @@ class ContactEnergy {
               detail::prefetch(means_[later.slot2]);
             }
             terms_[k] = S(0);
-            pushes_[k] = row.jn > S(0) ? 1 : 0;
             ContactImpulse<S> impulse;
             impulse.impact = row.impact;
-            if (pushes_[k] == 0) {
+            if (!(row.jn > S(0))) {
               impulses.set(k, impulse);
               continue;
             }
@@ -140,35 +139,29 @@ class ContactEnergy {
         });
   }
 
-  /// Islands: bodies joined by contacts, immovable ones apart. dT of an island is beta a + beta^2 b under a
-  /// common factor beta, a = sum J.u^- and b = sum J.(u^+ - u^-)/2 >= 0: zero at beta = -a/b.
+  /// Islands: movable bodies joined by contacts. dT of an island is beta a + beta^2 b under a common factor
+  /// beta, a = sum J.u^- and b = sum J.(u^+ - u^-)/2 >= 0: zero at beta = -a/b.
   bool guard(ContactProblem<S>& problem, const ContactColoring& colouring,
              std::span<const Contact<S>> contacts) {
-    const std::size_t n = problem.bodies.size();
-    gains_.assign(n, Gain{});
-    findIslands(colouring);
-    for (std::size_t k = 0; k < terms_.size(); ++k) {
-      if (terms_[k] != S(0)) {
-        const ContactColoring::Row& row = colouring.rows()[k];
-        Gain& gain = gains_[parent_[colouring.movable(row.slot1) ? row.slot1 : row.slot2]];
-        gain.sum += terms_[k];
-        gain.size += terms_[k] < S(0) ? S(-terms_[k]) : terms_[k];
-      }
+    if (!known_) {
+      findIslands(colouring);
+      known_ = true;
     }
+    findGains();
     const bool any =
         std::any_of(gains_.begin(), gains_.end(), [](const Gain& gain) { return gain.isReal(); });
     if (any) {
-      islands_.assign(n, Island{});
+      islands_.assign(gains_.size(), Island{});
       for (std::size_t k = 0; k < problem.rows.size(); ++k) {
         const Row& row = problem.rows[k];
-        const std::uint32_t island = islandOf(row, colouring);
+        const std::uint32_t island = islandOfRow_[k];
         if (gains_[island].isReal() && row.jn > S(0)) {
           const auto [normal, across] = power(problem, k, problem.initial[row.slot1],
                                               problem.initial[row.slot2], driftOf(problem, contacts, row));
           islands_[island].before += normal + across;
         }
       }
-      for (std::size_t slot = 0; slot < n; ++slot) {
+      for (std::size_t slot = 0; slot < islands_.size(); ++slot) {
         Island& island = islands_[slot];
         if (gains_[slot].isReal()) {
           const S a = island.before;
@@ -181,39 +174,51 @@ class ContactEnergy {
     return any;
   }
 
-  /// In a heap at rest the same contacts push for long.
-  void findIslands(const ContactColoring& colouring) {
-    if (known_ && pushes_ == pushedThen_) {
-      return;
-    }
-    known_ = true;
-    pushedThen_ = pushes_;
-    parent_.resize(colouring.bodies().size() + 1);
-    std::iota(parent_.begin(), parent_.end(), 0U);
-    for (std::size_t k = 0; k < pushes_.size(); ++k) {
-      const ContactColoring::Row& row = colouring.rows()[k];
-      if (pushes_[k] != 0 && colouring.movable(row.slot1) && colouring.movable(row.slot2)) {
-        join(row.slot1, row.slot2);
+  /// Sums over the rows of an island that follow each other stay in registers: most are of one.
+  void findGains() {
+    gains_.assign(islandOfSlot_.size(), Gain{});
+    for (std::size_t k = 0; k < terms_.size();) {
+      const std::uint32_t island = islandOfRow_[k];
+      Gain gain = gains_[island];
+      for (; k < terms_.size() && islandOfRow_[k] == island; ++k) {
+        gain.sum += terms_[k];
+        gain.size += terms_[k] < S(0) ? S(-terms_[k]) : terms_[k];
       }
-    }
-    for (std::uint32_t& parent : parent_) {  // a parent comes before its children
-      parent = parent_[parent];
+      gains_[island] = gain;
     }
   }
 
+  void findIslands(const ContactColoring& colouring) {
+    islandOfSlot_.resize(colouring.bodies().size() + 1);
+    std::iota(islandOfSlot_.begin(), islandOfSlot_.end(), 0U);
+    for (const ContactColoring::Row& row : colouring.rows()) {
+      if (colouring.movable(row.slot1) && colouring.movable(row.slot2)) {
+        join(row.slot1, row.slot2);
+      }
+    }
+    for (std::uint32_t& parent : islandOfSlot_) {  // a parent comes before its children
+      parent = islandOfSlot_[parent];
+    }
+    islandOfRow_.resize(colouring.rows().size());
+    parallelFor(islandOfRow_.size(), chunk, [&](std::size_t k) {
+      const ContactColoring::Row& row = colouring.rows()[k];
+      islandOfRow_[k] = islandOfSlot_[colouring.movable(row.slot1) ? row.slot1 : row.slot2];
+    });
+  }
+
   void shrink(ContactProblem<S>& problem, const ContactColoring& colouring) {
-    for (Row& row : problem.rows) {
-      const S beta = islands_[islandOf(row, colouring)].beta;
+    for (std::size_t k = 0; k < problem.rows.size(); ++k) {
+      const S beta = islands_[islandOfRow_[k]].beta;
       if (beta < S(1)) {
-        row.jn *= beta;
-        row.u *= beta;
+        problem.rows[k].jn *= beta;
+        problem.rows[k].u *= beta;
         if (!problem.turning.empty()) {
-          problem.turning[static_cast<std::size_t>(&row - problem.rows.data())].l *= beta;
+          problem.turning[k].l *= beta;
         }
       }
     }
     for (std::uint32_t slot = 0; slot < colouring.bodies().size(); ++slot) {
-      const S beta = islands_[find(slot)].beta;
+      const S beta = islands_[islandOfSlot_[slot]].beta;
       if (beta < S(1) && colouring.movable(slot)) {
         Body& b = problem.bodies[slot];
         const auto& b0 = problem.initial[slot];
@@ -223,30 +228,26 @@ class ContactEnergy {
     }
   }
 
-  std::uint32_t islandOf(const Row& row, const ContactColoring& colouring) {
-    return find(colouring.movable(row.slot1) ? row.slot1 : row.slot2);
-  }
-
-  std::uint32_t find(std::uint32_t i) {
-    while (parent_[i] != i) {
-      parent_[i] = parent_[parent_[i]];
-      i = parent_[i];
+  std::uint32_t rootOf(std::uint32_t i) {
+    while (islandOfSlot_[i] != i) {
+      islandOfSlot_[i] = islandOfSlot_[islandOfSlot_[i]];
+      i = islandOfSlot_[i];
     }
     return i;
   }
 
   void join(std::uint32_t i, std::uint32_t j) {
-    i = find(i);
-    j = find(j);
-    parent_[std::max(i, j)] = std::min(i, j);  // slots are numbered by ids: the same whatever the indices
+    i = rootOf(i);
+    j = rootOf(j);
+    islandOfSlot_[std::max(i, j)] =
+        std::min(i, j);  // slots are numbered by ids: the same whatever the indices
   }
 
-  std::vector<Body> means_;               ///< by slot
-  std::vector<S> terms_;                  ///< J.(u^- + u^+)/2 by row
-  std::vector<std::uint8_t> pushes_;      ///< by row
-  std::vector<std::uint8_t> pushedThen_;  ///< when `parent_` was found
-  bool known_ = false;                    ///< `parent_` is of these rows and `pushedThen_`
-  std::vector<std::uint32_t> parent_;
+  std::vector<Body> means_;  ///< by slot
+  std::vector<S> terms_;     ///< J.(u^- + u^+)/2 by row
+  bool known_ = false;       ///< the islands are of these rows
+  std::vector<std::uint32_t> islandOfSlot_;
+  std::vector<std::uint32_t> islandOfRow_;
   std::vector<Gain> gains_;      ///< by the slot that stands for the island
   std::vector<Island> islands_;  ///< by the slot that stands for it
 };
