@@ -316,6 +316,109 @@ TEST_CASE("a warm start needs fewer sweeps for the same answer, and a restart wi
   }
 }
 
+TEST_CASE(
+    "the same contacts once more begin with what the last solve did, as from its impulses to rounding") {
+  const double dt = 1e-3;
+  const Bodies<double, SoA> start = randomCloud<double>(150, 5.0, 11);
+  for (const double friction : {0.0, 0.4}) {
+    const Material<double> material{0.0, friction, friction, 0.0};
+    const auto contacts = contactsOf(start, material);
+    ContactSettings<double> settings;
+    settings.tolerance = 1e-13;
+    settings.maxIterations = 4000;
+    settings.accelerate = false;
+    ContactSolver<double> goesOn;
+    ContactSolver<double> beginsAgain;
+    Bodies<double, SoA> bodies = start;
+    goesOn.setSettings(settings);
+    goesOn.begin(contacts, bodies);
+    goesOn.solve(bodies, dt);
+    beginsAgain.setSettings(settings);
+    beginsAgain.setMemory(goesOn.memory(), dt);
+    // Forces as before, and longer: they bring the bodies to where the impulses, half as large again, push
+    // from.
+    const double longer = 1.5;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      bodies[i].velocity() += longer * Vector3<double>(start[i].velocity() - bodies[i].velocity());
+      bodies[i].angularVelocity() +=
+          longer * Vector3<double>(start[i].angularVelocity() - bodies[i].angularVelocity());
+    }
+    Bodies<double, SoA> others = bodies;
+    const Totals before(bodies);
+    const ContactReport<double> kept = goesOn.solve(bodies, longer * dt);
+    const ContactReport<double> found = beginsAgain.solve(contacts, others, longer * dt);
+    CHECK(kept.iterations <= found.iterations);
+    CHECK(Totals(bodies).energy <= before.energy);
+    CHECK((Totals(bodies).momentum - before.momentum).norm() <= 1e-15 * before.momentumScale);
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      CHECK((bodies[i].velocity() - others[i].velocity()).norm() < 1e-11);
+      CHECK((bodies[i].angularVelocity() - others[i].angularVelocity()).norm() < 1e-11);
+    }
+    for (std::size_t k = 0; k < contacts.size(); ++k) {
+      CHECK(std::abs(goesOn.impulses()[k].normal - beginsAgain.impulses()[k].normal) < 1e-11);
+      CHECK((goesOn.impulses()[k].tangential - beginsAgain.impulses()[k].tangential).norm() < 1e-11);
+    }
+  }
+}
+
+TEST_CASE("the same contacts once more: right at one look, let go by other forces, of another mass") {
+  const double dt = 1e-3;
+  const double g = 9.81;
+  const Bodies<double, SoA> start = column<double>(10, 1e-4, g, dt);
+  const auto contacts = contactsOf(start, Material<double>{}, floorAtZero<double>());
+  Bodies<double, SoA> bodies = start;
+  ContactSolver<double> solver;
+  ContactSettings<double> settings;
+  settings.tolerance = 1e-10;
+  settings.maxIterations = 2000;
+  solver.setSettings(settings);
+  solver.begin(contacts, bodies);
+  solver.solve(bodies, dt);
+  solver.setSettings({});
+  const auto kick = [&](double a) {
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      bodies[i].velocity()[2] += a * dt;
+    }
+  };
+  SECTION("the same forces: at rest after one look") {
+    kick(-g);
+    const ContactReport<double> report = solver.solve(bodies, dt);
+    CHECK(report.iterations == 1);
+    CHECK(report.residual <= 1e-6);
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      CHECK(bodies[i].velocity().norm() < 1e-4 * g * dt);
+    }
+  }
+  SECTION("forces upwards: all fly free") {
+    kick(g);
+    CHECK(solver.solve(bodies, dt).iterations > 1);
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      CHECK_THAT(bodies[i].velocity()[2], WithinRel(g * dt, 1e-3));
+      CHECK(solver.impulses()[i].normal < 1e-3 * g * dt);
+    }
+  }
+  SECTION("a body of four times the mass: the impulses are what momentum says") {
+    const std::size_t top = bodies.size() - 1;
+    bodies[top].mass() = 4;
+    kick(-g);
+    double before = 0;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      before += bodies[i].mass() * bodies[i].velocity()[2];
+    }
+    solver.solve(bodies, dt);
+    double after = 0;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      after += bodies[i].mass() * bodies[i].velocity()[2];
+    }
+    double floorPush = 0;
+    for (std::size_t k = 0; k < contacts.size(); ++k) {
+      floorPush -=
+          contacts[k].second == staticPartner ? solver.impulses()[k].normal * contacts[k].normal[2] : 0;
+    }
+    CHECK_THAT(after - before, WithinRel(floorPush, 1e-12));
+  }
+}
+
 TEST_CASE("a blow on a heap at rest: only what it reaches is looked at again, for the same answer") {
   const double dt = 1e-3;
   const double g = 9.81;

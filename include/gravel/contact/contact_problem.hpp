@@ -4,48 +4,62 @@
 /// All contacts of a step in the form that solvers work on: compact copies of the bodies (eight Scalars each)
 /// and one row a contact. Layouts and user's arrays end here.
 
-#include <gravel/contact/contact_coloring.hpp>
 #include <gravel/contact/impulse_list.hpp>
+#include <gravel/contact/problem_bodies.hpp>
 #include <gravel/contact/resting_gap.hpp>
-#include <gravel/contact/solver_rows.hpp>
-#include <gravel/core/parallel.hpp>
 
 #include <vector>
 
 namespace gravel {
 
-/// The problem of one step. Speeds and masses far from 1 are scaled by powers of two, which is exact, so that
-/// dust at 1e-310 m/s neither vanishes nor crawls through subnormal arithmetic.
+/// The problem of one step.
 template <Real S>
-class ContactProblem {
- public:
-  using Body = detail::SolverBody<S>;
-  using Row = detail::SolverRow<S>;
-  using Scales = detail::ProblemScales<S>;
+class ContactProblem : public detail::ProblemBodies<S> {
+  using Base = detail::ProblemBodies<S>;
+  using Base::accelerations_;
+  using Base::chunk;
+  using Base::gatherBodies;
+  using Base::massExponent_;
+  using Base::restart;
+  using Base::speedExponent_;
 
-  std::vector<Body> bodies;                     ///< by slot; the last one is the boundary, at rest
-  std::vector<detail::SolverStart<S>> initial;  ///< the same before any impulse
-  std::vector<Row> rows;                        ///< in the colouring's order
+ public:
+  using typename Base::Body;
+  using Row = detail::SolverRow<S>;
+  using Base::again;
+  using Base::bodies;
+  using Base::friction;
+  using Base::impulseIn;
+  using Base::initial;
+  using Base::speedIn;
+
+  std::vector<Row> rows;                ///< in the colouring's order
   std::vector<Vector3<S>> slipTargets;  ///< slip after a blow that sticks, by row; empty if zero for all
   std::vector<detail::TurningRow<S>> turning;  ///< by row; empty if nothing resists rolling or spinning
-  bool friction = false;                       ///< any contact where spin matters
   bool drifting = false;                       ///< any contact whose second side drifts
   bool active = false;                         ///< any contact that approaches faster than it may
   S largestApproach = S(0);  ///< largest change of a normal velocity that a contact asks for
+  S wrong_sq = S(0);  ///< if `again`, the largest change of a velocity that a sweep would make, squared
 
   /// Takes up bodies and contacts, and the first guess of the impulses with what it does to the bodies.
   /// \param dt [s] step that these contacts stand for, >= 0
   /// \param last impulses of the last solve by row, zero for those that are new
   /// \param ratio of forces that last: the guess is `ratio` times `last`; 0 for none
   /// \param fresh contacts are others, or elsewhere, than at the last call
-  template <ContactBodies B>
+  /// \param goesOn the contacts of the last problem, where they were, and `last` is its solution: the guess
+  ///        does to velocities what that did, `ratio` times, so that no contact needs to be asked; bodies
+  ///        whose masses have changed are guarded against
+  /// \param wrongAt(k) is the change, squared, that a sweep would make in row k
+  template <ContactBodies B, class WrongAt>
   void gather(std::span<const Contact<S>> contacts, const B& source, const ContactColoring& colouring,
               const S& dt, const ContactSettings<S>& settings, const ContactKinds& kinds,
-              const detail::ImpulseList<S>& last, const S& ratio, bool fresh) {
+              const detail::ImpulseList<S>& last, const S& ratio, bool fresh, bool goesOn,
+              WrongAt&& wrongAt) {
     friction = kinds.rub || kinds.turn;
     drifting = kinds.drift;
     const int massExponent = massExponent_;
-    gatherBodies(source, colouring);
+    again = goesOn;
+    gatherBodies(source, colouring, ratio);
     fresh = fresh || massExponent != massExponent_ || rows.size() != contacts.size();
     last_ = &last;
     ratio_ = ratio;
@@ -53,7 +67,7 @@ class ContactProblem {
     gaps_.resize(contacts.size());
     turning.resize(kinds.turn ? contacts.size() : 0);
     slipTargets.assign(friction && (kinds.drift || kinds.spring) ? rows.size() : 0, Vector3<S>::Zero());
-    const auto take = [&](std::size_t k, Largest& most) {
+    const auto take = [&](std::size_t k, Most& most) {
       const ContactColoring::Row& place = colouring.rows()[k];
       const Contact<S>& contact = contacts[place.contact];
       if (k + lookAhead < contacts.size()) {
@@ -72,32 +86,30 @@ class ContactProblem {
                                              bodies[place.slot1].spin, bodies[place.slot2].spin);
         }
       }
-      most += Largest{aim(k, contact, dt, settings, last.normal(k) > S(0))};
+      most += Most{aim(k, contact, dt, settings, last.normal(k) > S(0))};
     };
-    Largest most = detail::sumOverRows(0, colouring.loneCount(), Largest{}, take);
-    most += detail::sumOverColours(colouring, Largest{}, [&](std::size_t k, Largest& part) {
+    Most most = detail::sumOverRows(0, colouring.loneCount(), Most{}, [&](std::size_t k, Most& part) {
       take(k, part);
-      guess(k);
+      if (again) {  // lone rows are solved without a guess
+        restart(rows[k].slot1);
+        restart(rows[k].slot2);
+      }
     });
-    largestApproach = most.value;
+    if (again) {
+      most += detail::sumOverRows(colouring.loneCount(), rows.size(), Most{}, [&](std::size_t k, Most& part) {
+        take(k, part);
+        repeat(k);
+        part += Most{S(0), wrongAt(k)};
+      });
+    } else {
+      most += detail::sumOverColours(colouring, Most{}, [&](std::size_t k, Most& part) {
+        take(k, part);
+        guess(k);
+      });
+    }
+    largestApproach = most.approach;
+    wrong_sq = most.wrong_sq;
     active = largestApproach > S(0);
-  }
-
-  /// Writes the velocities of movable bodies back, spins only where they changed.
-  template <ContactBodies B>
-  void scatter(B& target, const ContactColoring& colouring) const {
-    auto&& velocities = target.velocities();
-    auto&& spins = target.angularVelocities();
-    auto&& radii = target.radii();
-    parallelFor(colouring.bodies().size(), chunk, [&](std::size_t slot) {
-      const std::uint32_t i = colouring.bodies()[slot];
-      if (bodies[slot].v != initial[slot].v) {
-        velocities[i] = detail::scaled<S>(bodies[slot].v, -speedExponent_);
-      }
-      if (friction && bodies[slot].s != initial[slot].s) {
-        spins[i] = Vector3<S>(detail::scaled<S>(bodies[slot].s, -speedExponent_) / radii[i]);
-      }
-    });
   }
 
   /// Brings what a later row needs nearer: rows of a colour jump through bodies and contacts.
@@ -111,86 +123,29 @@ class ContactProblem {
 
   /// What sweeps begin with in a row: the impulse of the last step again.
   detail::RowGuess<S> firstGuess(std::size_t k) const {
+    if (again) {
+      const Row& row = rows[k];
+      const S mobility = row.stick > S(0) ? S(S(1) / row.tangentialMass) : S(0);
+      return {impulseIn(S(ratio_ * last_->normal(k))),
+              mobility * impulseIn(Vector3<S>(ratio_ * last_->tangential(k)))};
+    }
     return ratio_ > S(0) && last_->normal(k) > S(0)
                ? detail::guessOf(rows[k], impulseIn(S(ratio_ * last_->normal(k))),
                                  impulseIn(Vector3<S>(ratio_ * last_->tangential(k))))
                : detail::RowGuess<S>{};
   }
 
-  /// Impulses and energies in SI units from those of the scaled problem, and back.
-  S impulseOut(const S& j) const { return detail::scaled<S>(j, -speedExponent_ - massExponent_); }
-  Vector3<S> impulseOut(const Vector3<S>& j) const {
-    return detail::scaled<S>(j, -speedExponent_ - massExponent_);
-  }
-  S impulseIn(const S& j) const { return detail::scaled<S>(j, speedExponent_ + massExponent_); }
-  Vector3<S> impulseIn(const Vector3<S>& j) const {
-    return detail::scaled<S>(j, speedExponent_ + massExponent_);
-  }
-  S energyOut(const S& e) const { return detail::scaled<S>(e, -2 * speedExponent_ - massExponent_); }
-  S speedIn(const S& v) const { return detail::scaled<S>(v, speedExponent_); }
-  Vector3<S> speedIn(const Vector3<S>& v) const { return detail::scaled<S>(v, speedExponent_); }
-
  private:
-  static constexpr std::size_t chunk = 512;
-
-  struct Largest {
-    S value = S(0);
-    Largest& operator+=(const Largest& other) {
-      value = std::max<S>(value, other.value);
+  /// The largest change that a contact asks for, and the largest that a sweep would make, squared.
+  struct Most {
+    S approach = S(0);
+    S wrong_sq = S(0);
+    Most& operator+=(const Most& other) {
+      approach = std::max<S>(approach, other.approach);
+      wrong_sq = std::max<S>(wrong_sq, other.wrong_sq);
       return *this;
     }
   };
-
-  template <class B>
-  void gatherBodies(const B& source, const ContactColoring& colouring) {
-    const std::size_t n = colouring.bodies().size();
-    bodies.resize(n + 1);
-    initial.resize(n + 1);
-    accelerations_.resize(n + 1);
-    const Scales scales = orderedSum(n, chunk, Scales{}, [&](std::size_t begin, std::size_t end) {
-      Scales part;
-      for (std::size_t slot = begin; slot < end; ++slot) {
-        part += take(source, colouring, slot);
-      }
-      return part;
-    });
-    accelerations_[n] = Vector3<S>::Zero();
-    initial[n].fall = S(0);
-    bodies[n] = Body{Vector3<S>::Zero(), S(0), Vector3<S>::Zero(), S(0)};
-    speedExponent_ = detail::scaleExponent<S>(scales.fastest, scales.fastest);
-    massExponent_ = detail::scaleExponent<S>(scales.lightest, scales.heaviest);
-    parallelFor(n + 1, chunk, [&](std::size_t slot) {
-      Body& b = bodies[slot];
-      if (speedExponent_ != 0) {
-        b.v = detail::scaled<S>(b.v, speedExponent_);
-        b.s = detail::scaled<S>(b.s, speedExponent_);
-      }
-      if (b.inverseMass > S(0)) {
-        b.inverseMass = S(1) / detail::scaled<S>(b.inverseMass, massExponent_);
-        b.spin *= b.inverseMass;
-      }
-      initial[slot].v = b.v;
-      initial[slot].s = b.s;
-    });
-  }
-
-  template <class B>
-  Scales take(const B& source, const ContactColoring& colouring, std::size_t slot) {
-    const std::uint32_t i = colouring.bodies()[slot];
-    Body& b = bodies[slot];
-    const bool movable = colouring.movable(static_cast<std::uint32_t>(slot));
-    const S r = source.radii()[i];
-    const S k = source.inertiaFactors()[i];
-    b.v = source.velocities()[i];
-    b.s =
-        friction ? Vector3<S>(r * Vector3<S>(source.angularVelocities()[i])) : Vector3<S>(Vector3<S>::Zero());
-    const Vector3<S> a = movable ? Vector3<S>(source.accelerations()[i]) : Vector3<S>(Vector3<S>::Zero());
-    accelerations_[slot] = a;
-    initial[slot].fall = detail::safeNorm(a);
-    b.inverseMass = movable ? S(source.masses()[i]) : S(0);  // the mass, until its scale is known
-    b.spin = movable && r > S(0) && k > S(0) ? S(1) / k : S(0);
-    return {std::max<S>(detail::maxAbs(b.v), detail::maxAbs(b.s)), b.inverseMass, b.inverseMass};
-  }
 
   /// What stays while bodies and surfaces stay.
   template <class B>
@@ -262,6 +217,16 @@ class ContactProblem {
     return row.target - present;
   }
 
+  /// Begins with the first guess of a row, whose bodies have it already.
+  void repeat(std::size_t k) {
+    const detail::RowGuess<S> first = firstGuess(k);
+    rows[k].jn = first.jn;
+    rows[k].u = first.u;
+    if (!turning.empty()) {
+      turning[k].l = impulseIn(Vector3<S>(ratio_ * last_->turning(k)));
+    }
+  }
+
   /// Begins with the first guess of a row, if there is one.
   [[gnu::flatten]] void guess(std::size_t k) {
     const detail::RowGuess<S> first = firstGuess(k);
@@ -290,12 +255,9 @@ class ContactProblem {
 
   static S ratio(const S& arm, const S& radius) { return radius > S(0) ? arm / radius : S(0); }
 
-  std::vector<Vector3<S>> accelerations_;         ///< [m s^-2] by slot, zero of what nothing moves
   std::vector<detail::RestingGap<S>> gaps_;       ///< by row: sweeps do not look at them
   const detail::ImpulseList<S>* last_ = nullptr;  ///< while it is solved
   S ratio_ = S(0);
-  int speedExponent_ = 0;
-  int massExponent_ = 0;
 };
 
 }  // namespace gravel

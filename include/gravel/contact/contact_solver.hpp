@@ -55,6 +55,7 @@ class ContactSolver {
   void begin(std::span<const Contact<S>> contacts, const B& bodies) {
     contacts_ = contacts;
     fresh_ = true;
+    goesOn_ = false;
     const bool asMany = contacts.size() == names_.size() && contacts.size() == coloring_.rows().size();
     const Findings found =
         orderedSum(contacts.size(), chunk, Findings{}, [&](std::size_t begin, std::size_t end) {
@@ -85,7 +86,8 @@ class ContactSolver {
   ContactReport<S> solve(B& bodies, const S& dt) {
     const std::span<const Contact<S>> contacts = contacts_;
     ContactReport<S> report;
-    bool solved = false;
+    const bool goesOn = goesOn_;
+    goesOn_ = false;
     listed_ = false;
     sameNames_ = !handedOn_;
     handedOn_ = false;
@@ -93,7 +95,9 @@ class ContactSolver {
     if (!contacts.empty()) {
       // Forces that last give impulses in proportion of the steps.
       const S ratio = settings_.warmStart && memoryStep_ > S(0) ? S(dt / memoryStep_) : S(0);
-      problem_.gather(contacts, bodies, coloring_, dt, settings_, kinds_, rowsBefore_, ratio, fresh_);
+      problem_.gather(contacts, bodies, coloring_, dt, settings_, kinds_, rowsBefore_, ratio, fresh_,
+                      goesOn && ratio > S(0),
+                      [&](std::size_t k) { return detail::RowImpulses<S>::wrongAt(problem_, k); });
       fresh_ = false;
       if (problem_.active) {
         report = std::visit([&](auto& algorithm) { return algorithm.solve(problem_, coloring_, settings_); },
@@ -101,10 +105,10 @@ class ContactSolver {
         energy_.settle(problem_, coloring_, contacts, otherRows_, report, rowImpulses_);
         otherRows_ = false;
         problem_.scatter(bodies, coloring_);
-        solved = true;
+        goesOn_ = true;
       }
     }
-    if (!solved) {
+    if (!goesOn_) {
       rowImpulses_.clear(contacts.size());
     }
     report.contacts = contacts.size();
@@ -193,6 +197,16 @@ class ContactSolver {
     return memory;
   }
   const S& memoryStep() const { return memoryStep_; }
+  /// What the last solve() did to the bodies of coloring(), if the next one goes on from there.
+  auto changes() const { return goesOn_ ? problem_.changes() : decltype(problem_.changes()){}; }
+  /// So does the next one after a restart: begin() was given the contacts of that solve, where they stood.
+  template <ContactBodies B>
+  void resume(const std::vector<detail::SlotChange<S>>& changes, const B& bodies) {
+    if (changes.size() == coloring_.bodies().size() && !changes.empty()) {
+      problem_.resume(changes, bodies, coloring_, kinds_);
+      goesOn_ = true;
+    }
+  }
   /// \param memory sorted by keys
   void setMemory(const std::vector<StoredImpulse<S>>& memory, const S& step) {
     if (sameNames_) {
@@ -208,9 +222,11 @@ class ContactSolver {
       names_.push_back({{stored.key1, stored.key2}, staticPartner, staticPartner});
     }
     inRows_ = false;
+    goesOn_ = false;
     memoryStep_ = step;
   }
   void forget() {
+    goesOn_ = false;
     rowImpulses_.clear(rowImpulses_.size());
     restored_.clear(restored_.size());
     listed_ = false;
@@ -295,6 +311,7 @@ class ContactSolver {
   std::vector<Vector3<S>> changes_;     ///< by slot: of workOn()
   S memoryStep_ = S(0);
   bool handedOn_ = false;   ///< no solve() since
+  bool goesOn_ = false;     ///< the last solve() was of these contacts, where they stand
   bool otherRows_ = true;   ///< than those that `energy_` knows
   bool sameNames_ = false;  ///< `rowsBefore_` goes with `names_`
   bool fresh_ = true;       ///< contacts may be elsewhere than at the last gathering

@@ -54,6 +54,27 @@ struct RowImpulses {
     return row.tangentialMass * du;
   }
 
+  /// The change of a velocity, squared, that a sweep would make in row k now. Resistance to turning left out.
+  [[gnu::flatten]] static S wrongAt(const ContactProblem<S>& problem, std::size_t k) {
+    Row row = problem.rows[k];
+    const Body& b1 = problem.bodies[row.slot1];
+    const Body& b2 = problem.bodies[row.slot2];
+    const S jn = row.jn;
+    const S next = jn + row.normalMass * (row.target - normalVelocity(row, b1, b2));
+    row.jn = next > S(0) ? next : S(0);
+    const S change = (row.jn - jn) * (b1.inverseMass + b2.inverseMass);
+    Progress progress{change * change};
+    if (row.stick > S(0) && (row.jn > S(0) || row.u != Vector3<S>::Zero())) {
+      Vector3<S> slip = slipVelocity(row, b1, b2);
+      if (!problem.slipTargets.empty()) {
+        slip -= problem.slipTargets[k];
+      }
+      Vector3<S> step = Vector3<S>::Zero();
+      rubbed(row, slip, step, progress);
+    }
+    return progress.change_sq;
+  }
+
   static Progress rub(ContactProblem<S>& problem, std::size_t k, Body& b1, Body& b2) {
     Row& row = problem.rows[k];
     Vector3<S> slip = slipVelocity(row, b1, b2);

@@ -54,12 +54,18 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     }
     const S rounding = S(8) * Eigen::NumTraits<S>::epsilon();
     const S enough = std::max<S>(settings.tolerance, rounding) * problem.largestApproach;
+    const std::size_t count = problem.rows.size() - colouring.loneCount();
+    if (problem.again && problem.turning.empty() && !(problem.wrong_sq > enough * enough)) {
+      report.iterations = 1;  // one that would change nothing
+      report.looks += count;
+      report.residual = sqrt(problem.wrong_sq) / problem.largestApproach;
+      return report;
+    }
     const bool accelerate = settings.accelerate && settings.maxIterations > 2;
     if (accelerate) {
       begin(problem);
     }
     watch_.begin(problem.bodies.size(), problem.rows.size(), S(enough / S(2)));
-    const std::size_t count = problem.rows.size() - colouring.loneCount();
     bool local = false;
     detail::SweepMomentum<S> momentum;
     while (true) {

@@ -43,13 +43,22 @@ struct alignas(rowAlignment<S>) SolverStart {
   Vector3<S> s;
 };
 
-/// The largest speed, and the masses > 0.
+/// What impulses changed in the velocities of a body.
+template <Real S>
+struct SlotChange {
+  Vector3<S> v;
+  Vector3<S> s;  ///< of r w
+};
+
+/// The largest speed, the masses > 0, and how many are not what they were.
 template <Real S>
 struct ProblemScales {
   S fastest = S(0);
   S lightest = S(0);
   S heaviest = S(0);
+  std::size_t others = 0;
   ProblemScales& operator+=(const ProblemScales& other) {
+    others += other.others;
     fastest = std::max<S>(fastest, other.fastest);
     heaviest = std::max<S>(heaviest, other.heaviest);
     if (other.lightest > S(0) && !(lightest > S(0) && lightest <= other.lightest)) {

@@ -150,7 +150,7 @@ class ContactStage {
   void forgetContacts() {
     impacts_.clear();
     contacts_.clear();
-    coloured_ = false;
+    contactsChanged();
     moved_ = false;
   }
 
@@ -182,7 +182,7 @@ class ContactStage {
         c.second = static_cast<std::uint32_t>(bodies.indexOf(BodyId{c.key2}));
       }
     }
-    coloured_ = false;
+    contactsChanged();
     moved_ = false;
   }
 
@@ -245,8 +245,16 @@ class ContactStage {
     if (!coloured_) {
       const Profiler::Scope scope(profiler, Phase::Colouring);
       solver_.begin(contacts_, bodies);
+      solver_.resume(resumed_, bodies);
+      resumed_.clear();
       coloured_ = true;
     }
+  }
+
+  /// Others, or elsewhere, than those that solver_ knows.
+  void contactsChanged() {
+    coloured_ = false;
+    resumed_.clear();
   }
 
   void renewGeometry(const Bodies& bodies, const Config& config, const Scalar& time);
@@ -290,6 +298,7 @@ class ContactStage {
   bool acted_ = false;                  // the last solve changed velocities
   bool firstActed_ = false;             // so did that of the first half of this part, or of the last one
   bool coloured_ = false;               // solver_ knows the present contacts
+  std::vector<detail::SlotChange<Scalar>> resumed_;  // what the solver of a restart goes on from
 };
 
 }  // namespace gravel

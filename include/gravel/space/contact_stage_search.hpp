@@ -16,7 +16,7 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
   const char* reason = reasonToSkip(bodies);
   if (reason != nullptr) {
     contacts_.clear();
-    coloured_ = false;
+    contactsChanged();
     profiler.skip(Phase::NeighbourSearch, reason);
     profiler.skip(Phase::NarrowPhase, reason);
     return;
@@ -27,14 +27,14 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
   prepareSurfaces(config);
   NarrowPhaseSettings<Scalar> settings{time, config.epsilon, Scalar(0), h};
   if (!goesOn) {
-    coloured_ = false;
+    contactsChanged();
     const Profiler::Scope scope(profiler, Phase::NarrowPhase);
     narrow_.find(neighbours_.pairs(), bodies, domain, materials.entries(), walls_, settings, contacts_,
                  nearBoundaries(bodies, Scalar(0)));
     return;
   }
   settings.resting = resting();
-  coloured_ = false;
+  contactsChanged();
   if (searched && settings.resting->empty() && report_.postponed == 0) {
     contacts_.clear();
     profiler.skip(Phase::NarrowPhase, "all that met on the way parted again");

@@ -77,7 +77,7 @@ void ContactStage<Scalar, Layout>::dropHeld(const Bodies& bodies) {
     }
   }
   solver_.setMemory(memory, solver_.memoryStep());
-  coloured_ = false;
+  contactsChanged();
   moved_ = false;
 }
 
@@ -93,7 +93,7 @@ void ContactStage<Scalar, Layout>::add(std::vector<Contact<Scalar>> contacts,
   contacts_.insert(contacts_.end(), contacts.begin(), contacts.end());
   std::sort(contacts_.begin(), contacts_.end(),
             [](const Contact<Scalar>& a, const Contact<Scalar>& b) { return keysBefore(a, b); });
-  coloured_ = false;
+  contactsChanged();
   moved_ = false;
 }
 

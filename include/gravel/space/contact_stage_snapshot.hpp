@@ -50,6 +50,11 @@ void ContactStage<Scalar, Layout>::save(SnapshotWriter& out) const {
   out.array("keys of impulses", keys.data(), keys.size());
   out.array("impulses", numbers.data(), numbers.size());
   out.value("step of impulses", solver_.memoryStep());
+  numbers.clear();
+  for (const auto& [dv, ds] : coloured_ ? solver_.changes() : resumed_) {
+    numbers.insert(numbers.end(), {dv[0], dv[1], dv[2], ds[0], ds[1], ds[2]});
+  }
+  out.array("changes by impulses", numbers.data(), numbers.size());
 }
 
 template <Real Scalar, class Layout>
@@ -112,6 +117,12 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
     memory[k] = {keys[2 * k], keys[2 * k + 1], {j[0], {j[1], j[2], j[3]}, {j[4], j[5], j[6]}}};
   }
   solver_.setMemory(std::move(memory), in.value<Scalar>("step of impulses"));
+  const std::vector<Scalar> changes = in.array<Scalar>("changes by impulses");
+  resumed_.resize(changes.size() / 6);
+  for (std::size_t slot = 0; slot < resumed_.size(); ++slot) {
+    const Scalar* c = &changes[6 * slot];
+    resumed_[slot] = {Vector3<Scalar>(c[0], c[1], c[2]), Vector3<Scalar>(c[3], c[4], c[5])};
+  }
 }
 
 }  // namespace gravel
