@@ -182,7 +182,10 @@ class ContactStage {
         c.second = static_cast<std::uint32_t>(bodies.indexOf(BodyId{c.key2}));
       }
     }
-    contactsChanged();
+    if (coloured_) {
+      resumed_ = solver_.changes();  // the solver counts bodies by ids: it goes on as if nothing had been
+      coloured_ = false;
+    }
     moved_ = false;
   }
 
@@ -298,7 +301,7 @@ class ContactStage {
   bool acted_ = false;                  // the last solve changed velocities
   bool firstActed_ = false;             // so did that of the first half of this part, or of the last one
   bool coloured_ = false;               // solver_ knows the present contacts
-  std::vector<detail::SlotChange<Scalar>> resumed_;  // what the solver of a restart goes on from
+  std::vector<detail::SlotChange<Scalar>> resumed_;  // what solver_ is to go on from once it has contacts_
 };
 
 }  // namespace gravel
