@@ -152,8 +152,8 @@ void run(const char* name, const Scene& scene, std::size_t settle, std::size_t s
   const double start = bytesInUse();
   gravel::Space<double> space = spaceOf(scene, gravel::SimulationConfig<double>{});
   std::size_t step = 0;
-  const auto go = [&](std::size_t steps) {
-    for (std::size_t k = 0; k < steps; ++k) {
+  const auto go = [&](std::size_t count) {
+    for (std::size_t k = 0; k < count; ++k) {
       space.computeDynamics(step++);
     }
   };
