@@ -118,6 +118,9 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
   }
   solver_.setMemory(std::move(memory), in.value<Scalar>("step of impulses"));
   const std::vector<Scalar> changes = in.array<Scalar>("changes by impulses");
+  if (changes.size() % 6 != 0) {
+    in.fail("holds a part of a body's change by impulses");
+  }
   resumed_.resize(changes.size() / 6);
   for (std::size_t slot = 0; slot < resumed_.size(); ++slot) {
     const Scalar* c = &changes[6 * slot];
