@@ -43,6 +43,18 @@ Vector3<S> slipOf(const Contact<S>& c, const Bodies<S, SoA>& bodies) {
   return u - c.normal.dot(u) * c.normal;
 }
 
+/// 12 x 12 x 4 unit balls, a little overlapped, on z = 0.
+Bodies<double, SoA> fourLayers() {
+  Bodies<double, SoA> bodies;
+  for (int i = 0; i < 12 * 12 * 4; ++i) {
+    Body<double> body;
+    body.radius = 0.5;
+    body.position = {0.9999 * (i % 12), 0.9999 * (i / 12 % 12), 0.4999 + 0.9999 * (i / 144)};
+    bodies.add(body);
+  }
+  return bodies;
+}
+
 }  // namespace
 
 TEMPLATE_TEST_CASE("a column of ten: from nothing, at default settings, each contact carries what lies on it",
@@ -419,19 +431,95 @@ TEST_CASE("the same contacts once more: right at one look, let go by other force
   }
 }
 
+// Seen to fail: where bodies begin left out of their ways (the pushed body keeps its push); rows that bounced
+// passed over (the ball falls on); the threshold, or a tolerance that became stricter, not asked for (looks).
+TEST_CASE("the same contacts once more: those between bodies that begin as they did are passed over") {
+  const double dt = 1e-3;
+  const double g = 9.81;
+  for (const double friction : {0.0, 0.5}) {
+    const Material<double> material{0.5, friction, friction, 0.0};
+    Bodies<double, SoA> bodies = fourLayers();
+    Body<double> ball;  // alone, and so fast that it bounces
+    ball.radius = 0.5;
+    ball.position = {30, 0, 0.4999};
+    ball.velocity = {0, 0, -100 * g * dt};
+    bodies.add(ball);
+    ball.position = {30.9999, 0, 0.4999};  // rests beside it, so that neither is alone
+    ball.velocity = {0, 0, 0};
+    bodies.add(ball);
+    const auto fall = [&](Bodies<double, SoA>& all) {
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        all[i].acceleration() = Vector3<double>(0, 0, -g);
+        all[i].velocity()[2] -= g * dt;
+      }
+    };
+    const auto contacts = contactsOf(bodies, material, floorAtZero<double>());
+    ContactSettings<double> settings;
+    settings.tolerance = 1e-4;
+    settings.maxIterations = 10000;
+    settings.accelerate = false;
+    ContactSolver<double> solver;
+    solver.setSettings(settings);
+    fall(bodies);
+    const int rounds = 40;
+    for (int k = 0; k < rounds; ++k) {  // each from the impulses of the one before
+      Bodies<double, SoA> start = bodies;
+      solver.begin(contacts, start);
+      solver.solve(start, dt);
+      if (k == rounds - 1) {
+        bodies = start;
+      }
+    }
+    const double enough = settings.tolerance * 150 * g * dt;  // the ball's approach, and half of it again
+    bodies[576].velocity()[2] = -100 * g * dt + g * dt;
+    fall(bodies);
+    const std::size_t pushed = 3 * 144;  // a corner on top
+    std::size_t expected = 1;            // the ball's
+    std::size_t most = std::numeric_limits<std::size_t>::max();
+    SECTION("nothing else") { most = contacts.size() / 10; }
+    SECTION("one body is pushed") {
+      bodies[pushed].velocity() += Vector3<double>(0.1, 0.1, -0.1) * (100 * g * dt);
+      expected = 2;
+    }
+    SECTION("another threshold of restitution: all are looked at") {
+      settings.restitutionThreshold = 1e-9;
+      expected = contacts.size();
+    }
+    SECTION("a stricter tolerance: all are looked at") {
+      settings.tolerance /= 2;
+      expected = contacts.size();
+    }
+    // What a look at every contact gives.
+    Bodies<double, SoA> exact = bodies;
+    ContactSolver<double> oracle;
+    ContactSettings<double> strict = settings;
+    strict.tolerance = 1e-12;
+    oracle.setSettings(strict);
+    oracle.setMemory(solver.memory(), dt);
+    oracle.solve(contacts, exact, dt);
+
+    solver.setSettings(settings);
+    const Totals before(bodies);
+    const ContactReport<double> report = solver.solve(bodies, dt);
+    CHECK(report.looks >= expected);
+    CHECK(report.looks <= most);
+    double furthest = 0.0;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      furthest = std::max(furthest, (bodies[i].velocity() - exact[i].velocity()).norm());
+    }
+    // A contact may be wrong by what ended the sweeps and half of it; errors of a body's few add up.
+    CHECK(furthest < 6 * enough);
+    CHECK(Totals(bodies).energy <= before.energy);
+  }
+}
+
 TEST_CASE("a blow on a heap at rest: only what it reaches is looked at again, for the same answer") {
   const double dt = 1e-3;
   const double g = 9.81;
   for (const double friction : {0.0, 0.5}) {
     Material<double> material{};
     material.staticFriction = material.kineticFriction = friction;
-    Bodies<double, SoA> bodies;
-    for (int i = 0; i < 12 * 12 * 4; ++i) {
-      Body<double> body;
-      body.radius = 0.5;
-      body.position = {0.9999 * (i % 12), 0.9999 * (i / 12 % 12), 0.4999 + 0.9999 * (i / 144)};
-      bodies.add(body);
-    }
+    Bodies<double, SoA> bodies = fourLayers();
     const auto fall = [&](Bodies<double, SoA>& all) {
       for (std::size_t i = 0; i < all.size(); ++i) {
         all[i].velocity() = Vector3<double>(0, 0, -g * dt);

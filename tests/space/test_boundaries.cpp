@@ -95,6 +95,19 @@ TEST_CASE("A conveyor belt drags a ball from rest to rolling at 2/7 of its speed
   CHECK(space.planes()[belt].offset == 0.0);
 }
 
+// Seen to fail: contacts that were found on the standing belt kept as they were, whose friction sees the belt
+// in the second half of the step alone.
+TEST_CASE("A belt that starts under a resting ball drags it with mu g from the first step on") {
+  const double mu = 0.25;
+  const double dt = 1e-3;
+  Space<double> space = onFloor(dt, mu);
+  space.addBody(ball({0, 0, 0.1}, {0, 0, 0}, 0.1, 2.0));
+  advance(space, 10);
+  space.setPlaneVelocity(0, {1.4, 0, 0});
+  advance(space, 1);
+  CHECK_THAT(space.body(0).velocity()[0], WithinRel(mu * g * dt, 1e-12));
+}
+
 // A plate that shakes with less than g carries the ball along: position to the gap that a resting contact may
 // have, force (over a step from t on) m (g + a(t)) to second order: a central difference of the prescribed
 // path has the relative error (omega dt)^2/12 there. (The first step starts from a plate at rest.)

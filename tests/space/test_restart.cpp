@@ -91,6 +91,47 @@ TEMPLATE_TEST_CASE("n + n steps through a file are 2n steps, byte for byte", "",
   CHECK(again.addBody(Body<S>()) == BodyId{60});  // ids of removed bodies are not given again
 }
 
+// What the solver goes on from in a heap at rest comes back: how far its bodies moved since each contact was
+// right, and what it was to do. Seen to fail: what it was to do left out of the file; the ways of bodies left
+// out; all contacts looked at after it; contacts that were passed over not brought up to date before sweeps.
+TEST_CASE("A heap at rest goes on with the same bits, saved after any of its steps") {
+  SimulationConfig<double> config;
+  config.G = 0;
+  config.timeStep = 1.0 / 60;
+  config.adaptiveTimeStep = false;
+  config.coeffFriction = config.coeffStaticFriction = 0.5;
+  config.coeffRestitution = 0.5;
+  Space<double> whole(config);
+  whole.setUniformField({0, 0, -9.81});
+  whole.addPlane({0, 0, 1}, 0);
+  for (const double side : {-1.0, 1.0}) {
+    whole.addPlane({side, 0, 0}, -2.7);
+    whole.addPlane({0, side, 0}, -2.7);
+  }
+  const CounterRandom random(3);
+  std::uint64_t counter = 0;
+  for (int i = 0; i < 150; ++i) {
+    Body<double> grain =
+        ball({1.05 * (i % 5 - 2), 1.05 * (i / 5 % 5 - 2), 0.6 + 1.1 * (i / 25)}, {0, 0, 0}, 0.5);
+    grain.position[0] += random.uniform(counter++, -0.02, 0.02);
+    grain.position[1] += random.uniform(counter++, -0.02, 0.02);
+    whole.addBody(grain);
+  }
+  advance(whole, 400);
+  whole.setContactTolerance(1e-2);
+  advance(whole, 100);
+  const TemporaryFile file("heap");
+  for (int save = 0; save < 25; ++save) {
+    whole.save(file.path());
+    Space<double> again;
+    again.restore(file.path());
+    advance(whole, 4);
+    advance(again, 4);
+    REQUIRE(sameBits(stateOf(whole), stateOf(again)));
+    CHECK(again.contactReport().looks == whole.contactReport().looks);
+  }
+}
+
 TEST_CASE("A file taken up in another layout continues with the same bits") {
   const TemporaryFile file("layout");
   auto soa = busy<double>();

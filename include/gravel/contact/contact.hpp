@@ -133,8 +133,9 @@ Vector3<Scalar> directionOfIds(std::uint64_t id1, std::uint64_t id2) {
 
 /// Two spheres with the separation r_12 = x2 - x1 of length `distance` and the sum of radii `reach` > 0.
 template <Real Scalar>
-Touch<Scalar> touchAt(const Vector3<Scalar>& r_12, const Scalar& distance, const Scalar& r1,
-                      const Scalar& reach, std::uint64_t id1, std::uint64_t id2, const Scalar& epsilon) {
+[[gnu::always_inline]] inline Touch<Scalar> touchAt(const Vector3<Scalar>& r_12, const Scalar& distance,
+                                                    const Scalar& r1, const Scalar& reach, std::uint64_t id1,
+                                                    std::uint64_t id2, const Scalar& epsilon) {
   const Scalar near = std::min(epsilon, Scalar(Scalar(16) * Eigen::NumTraits<Scalar>::epsilon() * reach));
   const bool coincident = !(distance > Scalar(0)) || distance <= near;
   const Scalar arm1 = distance * (r1 / reach);

@@ -33,9 +33,10 @@ class ContactEnergy {
     terms_.resize(problem.rows.size());
     known_ = known_ && !others;
     impulses.resize(problem.rows.size(), !problem.turning.empty());
-    Sums sums = takeDown(problem, contacts, impulses);
+    const std::size_t kept = problem.kept ? colouring.loneCount() : problem.rows.size();
+    Sums sums = takeDown(problem, contacts, kept, impulses);
     if (sums[3] > S(0) && guard(problem, colouring, contacts)) {
-      sums = takeDown(problem, contacts, impulses);
+      sums = takeDown(problem, contacts, problem.rows.size(), impulses);
     }
     report.restitutionLoss = problem.energyOut(sums[0]);
     report.frictionLoss = problem.energyOut(sums[1]);
@@ -60,10 +61,10 @@ class ContactEnergy {
     S beta = S(1);
   };
 
-  /// J_n v_n, and J_t.v_t with what turns, at the velocities `b1` and `b2`.
+  /// J_n v_n, and J_t.v_t with what turns, at the velocities `b1` and `b2`. \param jt has no part along n
   template <class B>
-  static std::array<S, 2> power(const ContactProblem<S>& problem, std::size_t k, const B& b1, const B& b2,
-                                const Vector3<S>& drift) {
+  static std::array<S, 2> power(const ContactProblem<S>& problem, std::size_t k, const S& jn,
+                                const Vector3<S>& jt, const B& b1, const B& b2, const Vector3<S>& drift) {
     const Row& row = problem.rows[k];
     Vector3<S> v_rel = b2.v - b1.v;
     if (problem.drifting) {
@@ -71,14 +72,12 @@ class ContactEnergy {
     }
     S across(0);
     if (row.stick > S(0)) {
-      // u has no part along n.
-      across = row.tangentialMass *
-               row.u.dot(Vector3<S>(v_rel - Vector3<S>(row.c1 * b1.s + row.c2 * b2.s).cross(row.n)));
+      across = jt.dot(Vector3<S>(v_rel - Vector3<S>(row.c1 * b1.s + row.c2 * b2.s).cross(row.n)));
     }
     if (!problem.turning.empty()) {
       across += problem.turning[k].l.dot(problem.turning[k].rho(b1, b2));
     }
-    return {row.jn * row.n.dot(v_rel), across};
+    return {jn * row.n.dot(v_rel), across};
   }
 
   /// The means of the bodies' velocities before and after.
@@ -98,45 +97,49 @@ class ContactEnergy {
     return problem.drifting ? problem.speedIn(contacts[row.contact].drift) : Vector3<S>(Vector3<S>::Zero());
   }
 
-  Sums takeDown(const ContactProblem<S>& problem, std::span<const Contact<S>> contacts,
+  /// \param kept from this row on impulses are those of the last problem
+  Sums takeDown(const ContactProblem<S>& problem, std::span<const Contact<S>> contacts, std::size_t kept,
                 detail::ImpulseList<S>& impulses) {
     findMeans(problem);
-    return orderedSum(
-        problem.rows.size(), chunk, Sums(Sums::Zero()), [&](std::size_t begin, std::size_t end) {
-          Sums sums = Sums::Zero();
-          for (std::size_t k = begin; k < end; ++k) {
-            const Row& row = problem.rows[k];
-            if (k + problem.lookAhead < problem.rows.size()) {
-              const Row& later = problem.rows[k + problem.lookAhead];
-              detail::prefetch(means_[later.slot1]);
-              detail::prefetch(means_[later.slot2]);
-            }
-            terms_[k] = S(0);
-            ContactImpulse<S> impulse;
-            impulse.impact = row.impact;
-            if (!(row.jn > S(0))) {
-              impulses.set(k, impulse);
-              continue;
-            }
-            const Vector3<S> jt = row.tangentialMass * row.u;
-            impulse.normal = problem.impulseOut(row.jn);
-            impulse.tangential = problem.impulseOut(jt);
-            if (!problem.turning.empty()) {
-              impulse.turning = problem.impulseOut(problem.turning[k].l);
-            }
-            impulses.set(k, impulse);
-            const Vector3<S> drift = driftOf(problem, contacts, row);
-            const auto [normal, across] = power(problem, k, means_[row.slot1], means_[row.slot2], drift);
-            terms_[k] = normal + across;
-            sums[0] -= normal;
-            sums[1] -= across;
-            if (problem.drifting) {
-              sums[2] -= Vector3<S>(row.jn * row.n + jt).dot(drift);
-            }
-            sums[3] += std::max<S>(S(0), terms_[k]);
-          }
-          return sums;
-        });
+    return orderedSum(problem.rows.size(), chunk, Sums(Sums::Zero()),
+                      [&](std::size_t begin, std::size_t end) {
+                        Sums sums = Sums::Zero();
+                        for (std::size_t k = begin; k < end; ++k) {
+                          const Row& row = problem.rows[k];
+                          if (k + problem.lookAhead < problem.rows.size()) {
+                            const Row& later = problem.rows[k + problem.lookAhead];
+                            detail::prefetch(means_[later.slot1]);
+                            detail::prefetch(means_[later.slot2]);
+                          }
+                          terms_[k] = S(0);
+                          ContactImpulse<S> impulse;
+                          impulse.impact = row.impact;
+                          const S jn = k < kept ? row.jn : problem.impulseIn(problem.last().normal(k));
+                          if (!(jn > S(0))) {
+                            impulses.set(k, impulse);
+                            continue;
+                          }
+                          const Vector3<S> jt = k < kept ? Vector3<S>(row.tangentialMass * row.u)
+                                                         : problem.impulseIn(problem.last().tangential(k));
+                          impulse.normal = problem.impulseOut(jn);
+                          impulse.tangential = problem.impulseOut(jt);
+                          if (!problem.turning.empty()) {
+                            impulse.turning = problem.impulseOut(problem.turning[k].l);
+                          }
+                          impulses.set(k, impulse);
+                          const Vector3<S> drift = driftOf(problem, contacts, row);
+                          const auto [normal, across] =
+                              power(problem, k, jn, jt, means_[row.slot1], means_[row.slot2], drift);
+                          terms_[k] = normal + across;
+                          sums[0] -= normal;
+                          sums[1] -= across;
+                          if (problem.drifting) {
+                            sums[2] -= Vector3<S>(jn * row.n + jt).dot(drift);
+                          }
+                          sums[3] += std::max<S>(S(0), terms_[k]);
+                        }
+                        return sums;
+                      });
   }
 
   /// Islands: movable bodies joined by contacts. dT of an island is beta a + beta^2 b under a common factor
@@ -151,13 +154,18 @@ class ContactEnergy {
     const bool any =
         std::any_of(gains_.begin(), gains_.end(), [](const Gain& gain) { return gain.isReal(); });
     if (any) {
+      if (problem.kept) {
+        problem.recall(colouring);
+      }
+      problem.watch.setHolds(false);  // of what comes now
       islands_.assign(gains_.size(), Island{});
       for (std::size_t k = 0; k < problem.rows.size(); ++k) {
         const Row& row = problem.rows[k];
         const std::uint32_t island = islandOfRow_[k];
         if (gains_[island].isReal() && row.jn > S(0)) {
-          const auto [normal, across] = power(problem, k, problem.initial[row.slot1],
-                                              problem.initial[row.slot2], driftOf(problem, contacts, row));
+          const auto [normal, across] =
+              power(problem, k, row.jn, Vector3<S>(row.tangentialMass * row.u), problem.initial[row.slot1],
+                    problem.initial[row.slot2], driftOf(problem, contacts, row));
           islands_[island].before += normal + across;
         }
       }

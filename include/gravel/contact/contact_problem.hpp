@@ -19,8 +19,8 @@ class ContactProblem : public detail::ProblemBodies<S> {
   using Base::accelerations_;
   using Base::chunk;
   using Base::gatherBodies;
-  using Base::massExponent_;
   using Base::restart;
+  using Base::sameScales_;
   using Base::speedExponent_;
 
  public:
@@ -32,6 +32,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
   using Base::impulseIn;
   using Base::initial;
   using Base::speedIn;
+  using Base::watch;
 
   std::vector<Row> rows;                ///< in the colouring's order
   std::vector<Vector3<S>> slipTargets;  ///< slip after a blow that sticks, by row; empty if zero for all
@@ -40,6 +41,10 @@ class ContactProblem : public detail::ProblemBodies<S> {
   bool active = false;                         ///< any contact that approaches faster than it may
   S largestApproach = S(0);  ///< largest change of a normal velocity that a contact asks for
   S wrong_sq = S(0);  ///< if `again`, the largest change of a velocity that a sweep would make, squared
+  /// If `again`, rows at rest between bodies that begin as they did were passed over: isPassed().
+  bool passes = false;
+  std::size_t looks = 0;  ///< at rows, to find `wrong_sq`
+  bool kept = false;      ///< said by who solves: the impulses of the last problem are those of this one
 
   /// Takes up bodies and contacts, and the first guess of the impulses with what it does to the bodies.
   /// \param dt [s] step that these contacts stand for, >= 0
@@ -57,26 +62,24 @@ class ContactProblem : public detail::ProblemBodies<S> {
               WrongAt&& wrongAt) {
     friction = kinds.rub || kinds.turn;
     drifting = kinds.drift;
-    const int massExponent = massExponent_;
     again = goesOn;
     gatherBodies(source, colouring, ratio);
-    fresh = fresh || massExponent != massExponent_ || rows.size() != contacts.size();
+    fresh = fresh || !sameScales_ || rows.size() != contacts.size();
     last_ = &last;
     ratio_ = ratio;
+    kept = false;
     rows.resize(contacts.size());
     gaps_.resize(contacts.size());
     turning.resize(kinds.turn ? contacts.size() : 0);
     slipTargets.assign(friction && (kinds.drift || kinds.spring) ? rows.size() : 0, Vector3<S>::Zero());
-    const auto take = [&](std::size_t k, Most& most) {
+    rests_.resize(contacts.size());
+    approaches_.resize(contacts.size());
+    passes = again && watch.holds() && sameScales_ && ratio == S(1) && turning.empty() &&
+             slipTargets.empty() && !drifting && settings.restitutionThreshold == threshold_;
+    threshold_ = settings.restitutionThreshold;
+    const auto fillFresh = [&](std::size_t k) {
       const ContactColoring::Row& place = colouring.rows()[k];
       const Contact<S>& contact = contacts[place.contact];
-      if (k + lookAhead < contacts.size()) {
-        const ContactColoring::Row& later = colouring.rows()[k + lookAhead];
-        if (fresh || drifting) {
-          detail::prefetch(contacts[later.contact]);
-        }
-        fetch(later.slot1, later.slot2);
-      }
       if (fresh) {
         fill(rows[k], contact, place, source);
         gaps_[k] = detail::RestingGap<S>::of(contact);
@@ -86,7 +89,23 @@ class ContactProblem : public detail::ProblemBodies<S> {
                                              bodies[place.slot1].spin, bodies[place.slot2].spin);
         }
       }
-      most += Most{aim(k, contact, dt, settings, last.normal(k) > S(0))};
+    };
+    const auto take = [&](std::size_t k, Most& most) {
+      if (k + lookAhead < contacts.size()) {
+        const ContactColoring::Row& later = colouring.rows()[k + lookAhead];
+        if (fresh || drifting) {
+          detail::prefetch(contacts[later.contact]);
+        }
+        fetch(later.slot1, later.slot2);
+      }
+      fillFresh(k);
+      approaches_[k] = aim(k, contacts[colouring.rows()[k].contact], dt, settings, last.normal(k) > S(0));
+      most += Most{approaches_[k]};
+    };
+    const auto look = [&](std::size_t k, Most& part) {
+      take(k, part);
+      repeat(k);
+      part += Most{S(0), wrongAt(k), 1};
     };
     Most most = detail::sumOverRows(0, colouring.loneCount(), Most{}, [&](std::size_t k, Most& part) {
       take(k, part);
@@ -95,13 +114,24 @@ class ContactProblem : public detail::ProblemBodies<S> {
         restart(rows[k].slot2);
       }
     });
-    if (again) {
-      most += detail::sumOverRows(colouring.loneCount(), rows.size(), Most{}, [&](std::size_t k, Most& part) {
-        take(k, part);
-        repeat(k);
-        part += Most{S(0), wrongAt(k)};
+    if (passes) {
+      Most all = most;
+      all += detail::sumOverRows(colouring.loneCount(), rows.size(), Most{}, [&](std::size_t k, Most& part) {
+        if (isPassed(k, colouring)) {
+          fillFresh(k);
+          part += Most{approaches_[k]};
+        } else {
+          look(k, part);
+          watch.enterFirst(k, false);
+        }
       });
-    } else {
+      // They were right to what was enough then: twice what the watch lets pass.
+      passes = !(settings.tolerance * all.approach < S(1.8) * watch.still());
+      most = passes ? all : most;
+    }
+    if (again && !passes) {
+      most += detail::sumOverRows(colouring.loneCount(), rows.size(), Most{}, look);
+    } else if (!again) {
       most += detail::sumOverColours(colouring, Most{}, [&](std::size_t k, Most& part) {
         take(k, part);
         guess(k);
@@ -109,6 +139,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
     }
     largestApproach = most.approach;
     wrong_sq = most.wrong_sq;
+    looks = most.looks;
     active = largestApproach > S(0);
   }
 
@@ -120,6 +151,19 @@ class ContactProblem : public detail::ProblemBodies<S> {
       detail::prefetch(initial[slot]);
     }
   }
+
+  /// If the problem `passes`: row k is at rest as in the last problem, between bodies that have hardly moved
+  /// since it was right. Its impulse is that of `last`, and the row itself is not up to date.
+  bool isPassed(std::size_t k, const ContactColoring& colouring) const;
+  /// Brings rows up to date that were passed over, before anything else moves.
+  void recall(const ContactColoring& colouring);
+  const detail::ImpulseList<S>& last() const { return *last_; }
+  /// What the next problem, of the same contacts, goes on from.
+  detail::SolvedProblem<S> solved() const;
+  /// Puts it back. \param kinds of the contacts
+  template <ContactBodies B>
+  void resume(const detail::SolvedProblem<S>& all, const B& source, const ContactColoring& colouring,
+              const ContactKinds& kinds);
 
   /// What sweeps begin with in a row: the impulse of the last step again.
   detail::RowGuess<S> firstGuess(std::size_t k) const {
@@ -136,11 +180,14 @@ class ContactProblem : public detail::ProblemBodies<S> {
   }
 
  private:
-  /// The largest change that a contact asks for, and the largest that a sweep would make, squared.
+  /// The largest change that a contact asks for, the largest that a sweep would make, squared, and for how
+  /// many rows that was found.
   struct Most {
     S approach = S(0);
     S wrong_sq = S(0);
+    std::size_t looks = 0;
     Most& operator+=(const Most& other) {
+      looks += other.looks;
       approach = std::max<S>(approach, other.approach);
       wrong_sq = std::max<S>(wrong_sq, other.wrong_sq);
       return *this;
@@ -156,6 +203,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
     row.slot1 = place.slot1;
     row.slot2 = place.slot2;
     row.contact = place.contact;
+    row.impact = false;
     row.c1 = ratio(c.arm1, source.radii()[c.first]);
     row.c2 = c.second == staticPartner ? S(0) : ratio(c.arm2, source.radii()[c.second]);
     row.normalMass = detail::reciprocal<S>(b1.inverseMass + b2.inverseMass);
@@ -196,6 +244,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
       fast = speed > speedIn(S(settings.restitutionThreshold + pull * dt));
     }
     const bool impact = v_n < S(0) && fast && speed > allowed;
+    rests_[k] = fast ? RowRest::Not : loaded ? RowRest::Loaded : RowRest::Free;
     row.impact = impact;  // booked otherwise than what rests, by who integrates in time
     const bool parts = v_n > S(0) && fast;
     // Newton's law for every contact that gets an impulse (Moreau 1988): v_n^+ = -e v_n^-. One that parts and
@@ -255,9 +304,17 @@ class ContactProblem : public detail::ProblemBodies<S> {
 
   static S ratio(const S& arm, const S& radius) { return radius > S(0) ? arm / radius : S(0); }
 
-  std::vector<detail::RestingGap<S>> gaps_;       ///< by row: sweeps do not look at them
+  std::vector<detail::RestingGap<S>> gaps_;  ///< by row: sweeps do not look at them
+  /// Whether what a row asks for left its restitution out of account, and whether it did so as one that
+  /// carried a load before.
+  enum class RowRest : std::uint8_t { Not, Free, Loaded };
+  std::vector<RowRest> rests_;                    ///< by row
+  std::vector<S> approaches_;                     ///< by row: change of the normal velocity that it asks for
+  S threshold_ = S(0);                            ///< [m s^-1] of restitution, in the last problem
   const detail::ImpulseList<S>* last_ = nullptr;  ///< while it is solved
   S ratio_ = S(0);
 };
 
 }  // namespace gravel
+
+#include <gravel/contact/contact_problem_again.hpp>

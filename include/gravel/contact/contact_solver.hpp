@@ -148,7 +148,6 @@ class ContactSolver {
     }
     return list_;
   }
-  /// The same as a copy.
   std::vector<ContactImpulse<S>> copyImpulses() const {
     return inRows_ ? inOrder(rowImpulses_).listed() : restored_.listed();
   }
@@ -197,13 +196,14 @@ class ContactSolver {
     return memory;
   }
   const S& memoryStep() const { return memoryStep_; }
-  /// What the last solve() did to the bodies of coloring(), if the next one goes on from there.
-  auto changes() const { return goesOn_ ? problem_.changes() : decltype(problem_.changes()){}; }
+  /// What the next solve() goes on from, if it does so.
+  detail::SolvedProblem<S> solved() const { return goesOn_ ? problem_.solved() : detail::SolvedProblem<S>{}; }
   /// So does the next one after a restart: begin() was given the contacts of that solve, where they stood.
   template <ContactBodies B>
-  void resume(const std::vector<detail::SlotChange<S>>& changes, const B& bodies) {
-    if (changes.size() == coloring_.bodies().size() && !changes.empty()) {
-      problem_.resume(changes, bodies, coloring_, kinds_);
+  void resume(const detail::SolvedProblem<S>& solved, const B& bodies) {
+    if (solved.bodies.size() == coloring_.bodies().size() && !solved.bodies.empty() &&
+        (solved.rows.size() == coloring_.rows().size() || solved.rows.empty())) {
+      problem_.resume(solved, bodies, coloring_, kinds_);
       goesOn_ = true;
     }
   }

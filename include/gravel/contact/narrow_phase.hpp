@@ -233,11 +233,15 @@ class NarrowPhase {
     const Vector3<S> r_ij = separation(pair, domain, settings, drift);
     const S reach = spheres_[i].r + spheres_[j].r;
     const S far = reach + widestMargin(settings, reach);
-    if (r_ij.squaredNorm() > far * far) {
+    const S distance_sq = r_ij.squaredNorm();
+    if (distance_sq > far * far) {
       return;  // the common case, before anything else is loaded
     }
-    const S distance = detail::safeNorm(r_ij);
-    const bool overlaps = distance < reach + settings.margin;
+    // A root is taken only where rounding could matter.
+    const S near = (S(1) - S(16) * Eigen::NumTraits<S>::epsilon()) * (reach + settings.margin);
+    const bool surely = distance_sq < near * near;
+    const S distance = surely ? S(0) : detail::safeNorm(r_ij);
+    const bool overlaps = surely || distance < reach + settings.margin;
     const auto falls = [&] { return S(accelerationOf(bodies, i) + accelerationOf(bodies, j)); };
     if (!(reach > S(0)) || (!overlaps && !(distance < reach + marginOf(settings, reach, falls)))) {
       return;

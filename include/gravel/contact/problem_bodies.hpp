@@ -4,6 +4,7 @@
 /// The bodies of a ContactProblem: before any impulse, and as impulses change them.
 
 #include <gravel/contact/contact_coloring.hpp>
+#include <gravel/contact/row_watch.hpp>
 #include <gravel/contact/solver_rows.hpp>
 #include <gravel/core/parallel.hpp>
 
@@ -22,29 +23,7 @@ class ProblemBodies {
   std::vector<SolverStart<S>> initial;  ///< the same before any impulse
   bool friction = false;                ///< any contact where spin matters
   bool again = false;  ///< the last problem once more: what that did to the bodies is done again
-
-  /// What the last solve changed in the velocities of each slot [m s^-1]: v and r w.
-  std::vector<SlotChange<S>> changes() const {
-    std::vector<SlotChange<S>> all;
-    for (std::size_t slot = 0; slot + 1 < bodies.size(); ++slot) {
-      all.push_back({scaled<S>(Vector3<S>(bodies[slot].v - initial[slot].v), -speedExponent_),
-                     scaled<S>(Vector3<S>(bodies[slot].s - initial[slot].s), -speedExponent_)});
-    }
-    return all;
-  }
-  /// Puts them back, for a problem that goes on.
-  template <ContactBodies B>
-  void resume(const std::vector<SlotChange<S>>& changes, const B& source, const ContactColoring& colouring,
-              const ContactKinds& kinds) {
-    friction = kinds.rub || kinds.turn;
-    again = false;
-    gatherBodies(source, colouring, S(0));
-    for (std::size_t slot = 0; slot < changes.size(); ++slot) {
-      bodies[slot].v = speedIn(changes[slot].v);
-      bodies[slot].s = speedIn(changes[slot].s);
-      initial[slot].v = initial[slot].s = Vector3<S>::Zero();
-    }
-  }
+  RowWatch<S> watch;   ///< what a body has moved by since rows were right, where it begins included
 
   /// Writes the velocities of movable bodies back, spins only where they changed.
   template <ContactBodies B>
@@ -82,28 +61,37 @@ class ProblemBodies {
     bodies.resize(n + 1);
     initial.resize(n + 1);
     accelerations_.resize(n + 1);
+    watch.setHolds(watch.holds() && again && speedExponent_ == 0);
     const Scales scales = orderedSum(n, chunk, Scales{}, [&](std::size_t begin, std::size_t end) {
       Scales part;
       for (std::size_t slot = begin; slot < end; ++slot) {
-        const Body before = bodies[slot];
-        part += take(source, colouring, slot);
+        Body now = take(source, colouring, slot);
+        part += {std::max<S>(maxAbs(now.v), maxAbs(now.s)), now.inverseMass, now.inverseMass};
         if (again) {
-          initial[slot].v = before.v - initial[slot].v;
-          initial[slot].s = before.s - initial[slot].s;
-          Body now = bodies[slot];
-          weigh(now);
-          part.others += now.inverseMass == before.inverseMass && now.spin == before.spin ? 0 : 1;
+          const Body& before = bodies[slot];
+          auto& start = initial[slot];
+          if (watch.holds()) {
+            watch.move(slot, Vector3<S>(now.v - start.v).norm() + Vector3<S>(now.s - start.s).norm());
+          }
+          start.v = before.v - start.v;
+          start.s = before.s - start.s;
+          Body weighed = now;
+          weigh(weighed);
+          part.others += weighed.inverseMass == before.inverseMass && weighed.spin == before.spin ? 0 : 1;
         }
+        bodies[slot] = now;
       }
       return part;
     });
     again = again && scales.others == 0;
     const int speedExponent = speedExponent_;
+    const int massExponent = massExponent_;
     accelerations_[n] = Vector3<S>::Zero();
     initial[n].fall = S(0);
     bodies[n] = Body{Vector3<S>::Zero(), S(0), Vector3<S>::Zero(), S(0)};
     speedExponent_ = scaleExponent<S>(scales.fastest, scales.fastest);
     massExponent_ = scaleExponent<S>(scales.lightest, scales.heaviest);
+    sameScales_ = speedExponent == speedExponent_ && massExponent == massExponent_;
     parallelFor(n + 1, chunk, [&](std::size_t slot) {
       Body& b = bodies[slot];
       if (speedExponent_ != 0) {
@@ -139,10 +127,11 @@ class ProblemBodies {
     }
   }
 
+  /// A body with its mass in place of its inverse, until the scale of masses is known.
   template <class B>
-  Scales take(const B& source, const ContactColoring& colouring, std::size_t slot) {
+  Body take(const B& source, const ContactColoring& colouring, std::size_t slot) {
     const std::uint32_t i = colouring.bodies()[slot];
-    Body& b = bodies[slot];
+    Body b;
     const bool movable = colouring.movable(static_cast<std::uint32_t>(slot));
     const S r = source.radii()[i];
     const S k = source.inertiaFactors()[i];
@@ -152,14 +141,15 @@ class ProblemBodies {
     const Vector3<S> a = movable ? Vector3<S>(source.accelerations()[i]) : Vector3<S>(Vector3<S>::Zero());
     accelerations_[slot] = a;
     initial[slot].fall = safeNorm(a);
-    b.inverseMass = movable ? S(source.masses()[i]) : S(0);  // the mass, until its scale is known
+    b.inverseMass = movable ? S(source.masses()[i]) : S(0);
     b.spin = movable && r > S(0) && k > S(0) ? S(1) / k : S(0);
-    return {std::max<S>(maxAbs(b.v), maxAbs(b.s)), b.inverseMass, b.inverseMass};
+    return b;
   }
 
   std::vector<Vector3<S>> accelerations_;  ///< [m s^-2] by slot, zero of what nothing moves
   int speedExponent_ = 0;
   int massExponent_ = 0;
+  bool sameScales_ = false;  ///< as in the last problem
 };
 
 }  // namespace gravel::detail

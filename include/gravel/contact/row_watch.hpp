@@ -6,6 +6,7 @@
 #include <gravel/core/types.hpp>
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 namespace gravel::detail {
@@ -21,28 +22,47 @@ class RowWatch {
     still_ = still;
     ways_.assign(slots, S(0));
     then_.resize(rows);
+    holds_ = false;
   }
+  /// Goes on with other rows being right enough.
+  void goOn(const S& still) { still_ = still; }
 
   const S& still() const { return still_; }
 
-  /// \param way >= 0, at least how far the body moved; never called for what nothing moves
-  void move(std::uint32_t slot, const S& way) { ways_[slot] += way; }
+  /// \param way >= 0, at least how far the body moved; by contacts never called for what nothing moves
+  void move(std::size_t slot, const S& way) { ways_[slot] += way; }
 
   /// Row k, between these two, is right now.
   void enter(std::size_t k, std::uint32_t slot1, std::uint32_t slot2) {
     then_[k] = ways_[slot1] + ways_[slot2];
   }
-  /// Nothing has moved yet; row k is right, or else stale.
-  void enterFirst(std::size_t k, bool isRight) { then_[k] = isRight ? S(0) : S(-1) - still_; }
+  /// Row k is right where nothing has moved yet, or else stale whatever moves.
+  void enterFirst(std::size_t k, bool isRight) { then_[k] = isRight ? S(0) : S(-1); }
 
   bool isStale(std::size_t k, std::uint32_t slot1, std::uint32_t slot2) const {
-    return ways_[slot1] + ways_[slot2] > then_[k] + still_;
+    return then_[k] < S(0) || ways_[slot1] + ways_[slot2] > then_[k] + still_;
+  }
+
+  /// Whether every row was right when it was entered, and every move since is known: what comes next may
+  /// begin by passing rows over.
+  bool holds() const { return holds_; }
+  void setHolds(bool holds) { holds_ = holds; }
+
+  /// For a restart.
+  const std::vector<S>& ways() const { return ways_; }
+  const std::vector<S>& then() const { return then_; }
+  void restore(const S& still, std::vector<S> ways, std::vector<S> then) {
+    still_ = still;
+    ways_ = std::move(ways);
+    then_ = std::move(then);
+    holds_ = true;
   }
 
  private:
   S still_ = S(0);
   std::vector<S> ways_;  ///< by slot
-  std::vector<S> then_;  ///< by row: of its two when it was right
+  std::vector<S> then_;  ///< by row: of its two when it was right; -1 if it never was
+  bool holds_ = false;
 };
 
 }  // namespace gravel::detail

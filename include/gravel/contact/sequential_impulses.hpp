@@ -8,7 +8,6 @@
 
 #include <gravel/contact/contact_energy.hpp>
 #include <gravel/contact/row_impulses.hpp>
-#include <gravel/contact/row_watch.hpp>
 #include <gravel/contact/sweep_momentum.hpp>
 
 namespace gravel {
@@ -45,6 +44,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
                          const ContactSettings<S>& settings) {
     using std::sqrt;
     ContactReport<S> report;
+    problem.watch.setHolds(false);
     detail::sumOverRows(0, colouring.loneCount(), Progress{},
                         [&](std::size_t k, Progress& /*sum*/) { strike(problem, k); });
     report.looks = colouring.loneCount();
@@ -57,7 +57,9 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     const std::size_t count = problem.rows.size() - colouring.loneCount();
     if (problem.again && problem.turning.empty() && !(problem.wrong_sq > enough * enough)) {
       report.iterations = 1;  // one that would change nothing
-      report.looks += count;
+      report.looks += problem.looks;
+      problem.kept = problem.passes;
+      problem.watch.setHolds(problem.passes);
       report.residual = sqrt(problem.wrong_sq) / problem.largestApproach;
       return report;
     }
@@ -65,8 +67,14 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     if (accelerate) {
       begin(problem);
     }
-    watch_.begin(problem.bodies.size(), problem.rows.size(), S(enough / S(2)));
-    bool local = false;
+    bool local = problem.passes;
+    if (local) {  // only rows that were not passed over are stale
+      problem.recall(colouring);
+      problem.watch.goOn(enough / S(2));
+    } else {
+      problem.watch.begin(problem.bodies.size(), problem.rows.size(), S(enough / S(2)));
+    }
+    bool watched = true;  // all that moves bodies
     detail::SweepMomentum<S> momentum;
     while (true) {
       const Progress now = detail::sumOverColours(colouring, Progress{}, [&](std::size_t k, Progress& sum) {
@@ -76,14 +84,16 @@ class SequentialImpulses : private detail::RowImpulses<S> {
           relaxNext(problem, k, momentum.beta, report.iterations == 0 || !accelerate, sum);
         }
       });
+      watched = watched && (local || report.iterations == 0 || !accelerate);
       ++report.iterations;
       report.looks += local ? now.looked : count;
       const S change = sqrt(now.change_sq);
       report.residual = change / problem.largestApproach;
       if (!(change > enough) || report.iterations >= settings.maxIterations) {
+        problem.watch.setHolds(watched && !(change > enough));
         return report;
       }
-      local = report.iterations == 1 ? now.changed < count / few : local;
+      local = local || (report.iterations == 1 && now.changed < count / few);
       if (local) {
         local = report.looks < 2 * problem.rows.size();
         if (!local && accelerate) {
@@ -208,7 +218,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
   /// A row, unless its ends stand nearly as they did when it was right.
   void relaxStale(ContactProblem<S>& problem, const ContactColoring::Row& ends, std::size_t k,
                   Progress& sum) {
-    if (watch_.isStale(k, ends.slot1, ends.slot2)) {
+    if (problem.watch.isStale(k, ends.slot1, ends.slot2)) {
       relax<true>(problem, k, S(0), sum);
       ++sum.looked;
     }
@@ -291,20 +301,19 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     } else {
       const S push = (dj < S(0) ? S(-dj) : dj) + push_t;
       if (b1.inverseMass > S(0)) {
-        watch_.move(row.slot1, b1.inverseMass * push + turn1);
+        problem.watch.move(row.slot1, b1.inverseMass * push + turn1);
       }
       if (b2.inverseMass > S(0)) {
-        watch_.move(row.slot2, b2.inverseMass * push + turn2);
+        problem.watch.move(row.slot2, b2.inverseMass * push + turn2);
       }
-      watch_.enter(k, row.slot1, row.slot2);
-      progress.changed = progress.change_sq > watch_.still() * watch_.still() ? 1 : 0;
+      problem.watch.enter(k, row.slot1, row.slot2);
+      progress.changed = progress.change_sq > problem.watch.still() * problem.watch.still() ? 1 : 0;
     }
     sum += progress;
   }
 
   std::vector<BodyStep> bodySteps_;
   std::vector<RowStep> steps_;  ///< of sweeps with momentum
-  detail::RowWatch<S> watch_;
 };
 
 }  // namespace gravel

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <bit>
 #include <limits>
+#include <vector>
 
 namespace gravel {
 
@@ -43,11 +44,26 @@ struct alignas(rowAlignment<S>) SolverStart {
   Vector3<S> s;
 };
 
-/// What impulses changed in the velocities of a body.
+/// What the next solve of the same contacts goes on from.
 template <Real S>
-struct SlotChange {
-  Vector3<S> v;
-  Vector3<S> s;  ///< of r w
+struct SolvedProblem {
+  struct Body {
+    Vector3<S> v0;  ///< [m s^-1] before any impulse
+    Vector3<S> s0;  ///< of r w
+    Vector3<S> v;   ///< after all of them
+    Vector3<S> s;
+    S way;  ///< of RowWatch
+  };
+  struct Row {
+    S then;  ///< of RowWatch
+    S approach;
+    S target;
+    S rest;  ///< a RowRest
+  };
+  std::vector<Body> bodies;  ///< by slot; empty if the next solve begins anew
+  std::vector<Row> rows;     ///< empty if all are to be looked at
+  S still = S(0);
+  S threshold = S(0);
 };
 
 /// The largest speed, the masses > 0, and how many are not what they were.
@@ -195,7 +211,7 @@ template <Real S>
 
 /// x 2^exponent, exactly; a scalar that is not built in stays as it is.
 template <Real S>
-S scaled(const S& x, int exponent) {
+[[gnu::always_inline]] inline S scaled(const S& x, int exponent) {
   if constexpr (std::is_floating_point_v<S>) {
     return exponent == 0 ? x : std::ldexp(x, exponent);
   } else {
@@ -204,7 +220,7 @@ S scaled(const S& x, int exponent) {
 }
 
 template <Real S>
-Vector3<S> scaled(const Vector3<S>& v, int exponent) {
+[[gnu::always_inline]] inline Vector3<S> scaled(const Vector3<S>& v, int exponent) {
   return exponent == 0
              ? v
              : Vector3<S>(scaled<S>(v[0], exponent), scaled<S>(v[1], exponent), scaled<S>(v[2], exponent));

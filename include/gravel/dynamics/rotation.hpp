@@ -25,9 +25,19 @@ Quaternion<Scalar> rotated(const Quaternion<Scalar>& q, const Vector3<Scalar>& w
     turn.w() = Scalar(1) - angle_sq / Scalar(2) * (Scalar(1) - angle_sq / Scalar(12));
     turn.vec() = half_turn * Scalar(Scalar(1) - angle_sq / Scalar(6) * (Scalar(1) - angle_sq / Scalar(20)));
   }
-  Quaternion<Scalar> next = turn * q;
-  next.normalize();
-  return next;
+  // turn * q, coefficient by coefficient: Eigen's product goes through memory.
+  const Scalar w1 = turn.w(), x1 = turn.x(), y1 = turn.y(), z1 = turn.z();
+  const Scalar w2 = q.w(), x2 = q.x(), y2 = q.y(), z2 = q.z();
+  const Scalar w3 = w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2;
+  const Scalar x3 = w1 * x2 + x1 * w2 + y1 * z2 - z1 * y2;
+  const Scalar y3 = w1 * y2 + y1 * w2 + z1 * x2 - x1 * z2;
+  const Scalar z3 = w1 * z2 + z1 * w2 + x1 * y2 - y1 * x2;
+  const Scalar excess = (w3 * w3 + x3 * x3 + y3 * y3 + z3 * z3) - Scalar(1);
+  // 1/sqrt(1 + x) = 1 - x/2 + 3/8 x^2 ...
+  const Scalar scale = excess * excess < Eigen::NumTraits<Scalar>::epsilon()
+                           ? Scalar(1) - excess / Scalar(2)
+                           : Scalar(Scalar(1) / Scalar(sqrt(Scalar(1) + excess)));
+  return Quaternion<Scalar>(scale * w3, scale * x3, scale * y3, scale * z3);
 }
 
 }  // namespace gravel

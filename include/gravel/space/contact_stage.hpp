@@ -48,6 +48,7 @@ class ContactStage {
     for (Contact<Scalar>& c : contacts_) {
       if (c.second == staticPartner && c.key2 == boundaryKey(plane)) {
         c.drift = velocity;
+        contactsChanged();
       }
     }
   }
@@ -183,7 +184,7 @@ class ContactStage {
       }
     }
     if (coloured_) {
-      resumed_ = solver_.changes();  // the solver counts bodies by ids: it goes on as if nothing had been
+      resumed_ = solver_.solved();  // the solver counts bodies by ids: it goes on as if nothing had been
       coloured_ = false;
     }
     moved_ = false;
@@ -249,7 +250,7 @@ class ContactStage {
       const Profiler::Scope scope(profiler, Phase::Colouring);
       solver_.begin(contacts_, bodies);
       solver_.resume(resumed_, bodies);
-      resumed_.clear();
+      resumed_ = {};
       coloured_ = true;
     }
   }
@@ -257,7 +258,7 @@ class ContactStage {
   /// Others, or elsewhere, than those that solver_ knows.
   void contactsChanged() {
     coloured_ = false;
-    resumed_.clear();
+    resumed_ = {};
   }
 
   void renewGeometry(const Bodies& bodies, const Config& config, const Scalar& time);
@@ -297,11 +298,11 @@ class ContactStage {
   Scalar separationLoss_ = Scalar(0);
   bool idle_ = false;
   bool moved_ = false;
-  std::vector<std::uint8_t> wasMoved_;  // by body: in the last separation
-  bool acted_ = false;                  // the last solve changed velocities
-  bool firstActed_ = false;             // so did that of the first half of this part, or of the last one
-  bool coloured_ = false;               // solver_ knows the present contacts
-  std::vector<detail::SlotChange<Scalar>> resumed_;  // what solver_ is to go on from once it has contacts_
+  std::vector<std::uint8_t> wasMoved_;     // by body: in the last separation
+  bool acted_ = false;                     // the last solve changed velocities
+  bool firstActed_ = false;                // so did that of the first half of this part, or of the last one
+  bool coloured_ = false;                  // solver_ knows the present contacts
+  detail::SolvedProblem<Scalar> resumed_;  // what solver_ is to go on from once it has contacts_
 };
 
 }  // namespace gravel

@@ -50,11 +50,20 @@ void ContactStage<Scalar, Layout>::save(SnapshotWriter& out) const {
   out.array("keys of impulses", keys.data(), keys.size());
   out.array("impulses", numbers.data(), numbers.size());
   out.value("step of impulses", solver_.memoryStep());
+  const detail::SolvedProblem<Scalar> solved = coloured_ ? solver_.solved() : resumed_;
+  numbers = {solved.still, solved.threshold};
+  out.array("solved to", numbers.data(), numbers.size());
   numbers.clear();
-  for (const auto& [dv, ds] : coloured_ ? solver_.changes() : resumed_) {
-    numbers.insert(numbers.end(), {dv[0], dv[1], dv[2], ds[0], ds[1], ds[2]});
+  for (const auto& [v0, s0, v, s, way] : solved.bodies) {
+    numbers.insert(numbers.end(),
+                   {v0[0], v0[1], v0[2], s0[0], s0[1], s0[2], v[0], v[1], v[2], s[0], s[1], s[2], way});
   }
-  out.array("changes by impulses", numbers.data(), numbers.size());
+  out.array("solved bodies", numbers.data(), numbers.size());
+  numbers.clear();
+  for (const auto& [then, approach, target, rest] : solved.rows) {
+    numbers.insert(numbers.end(), {then, approach, target, rest});
+  }
+  out.array("solved contacts", numbers.data(), numbers.size());
 }
 
 template <Real Scalar, class Layout>
@@ -117,14 +126,22 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
     memory[k] = {keys[2 * k], keys[2 * k + 1], {j[0], {j[1], j[2], j[3]}, {j[4], j[5], j[6]}}};
   }
   solver_.setMemory(std::move(memory), in.value<Scalar>("step of impulses"));
-  const std::vector<Scalar> changes = in.array<Scalar>("changes by impulses");
-  if (changes.size() % 6 != 0) {
-    in.fail("holds a part of a body's change by impulses");
+  const std::vector<Scalar> to = in.array<Scalar>("solved to");
+  const std::vector<Scalar> moved = in.array<Scalar>("solved bodies");
+  const std::vector<Scalar> looked = in.array<Scalar>("solved contacts");
+  if (to.size() != 2 || moved.size() % 13 != 0 || looked.size() % 4 != 0 ||
+      (!looked.empty() && looked.size() / 4 != contacts_.size())) {
+    in.fail("holds a part of a solved body or contact");
   }
-  resumed_.resize(changes.size() / 6);
-  for (std::size_t slot = 0; slot < resumed_.size(); ++slot) {
-    const Scalar* c = &changes[6 * slot];
-    resumed_[slot] = {Vector3<Scalar>(c[0], c[1], c[2]), Vector3<Scalar>(c[3], c[4], c[5])};
+  resumed_ = {{}, {}, to[0], to[1]};
+  for (std::size_t k = 0; k < moved.size(); k += 13) {
+    const auto at = [&](std::size_t c) {
+      return Vector3<Scalar>(moved[k + c], moved[k + c + 1], moved[k + c + 2]);
+    };
+    resumed_.bodies.push_back({at(0), at(3), at(6), at(9), moved[k + 12]});
+  }
+  for (std::size_t k = 0; k < looked.size(); k += 4) {
+    resumed_.rows.push_back({looked[k], looked[k + 1], looked[k + 2], looked[k + 3]});
   }
 }
 

@@ -1,0 +1,84 @@
+#pragma once
+
+/// \file
+/// Members of `ContactProblem` for the same contacts once more: which rows need no look, and what a restart
+/// puts back.
+///
+/// A row that is right stays so while its bodies begin where they began and their impulses stay: how far both
+/// may have moved since is half of what ended the sweeps, and counts the change of where they begin. What a
+/// row asks for must not depend on how fast it is approached, so that those with restitution are looked at,
+/// and those whose load has gone.
+
+#include <gravel/contact/contact_problem.hpp>
+
+namespace gravel {
+
+template <Real S>
+bool ContactProblem<S>::isPassed(std::size_t k, const ContactColoring& colouring) const {
+  const ContactColoring::Row& place = colouring.rows()[k];
+  return (rests_[k] == RowRest::Free || (rests_[k] == RowRest::Loaded && last_->normal(k) > S(0))) &&
+         !watch.isStale(k, place.slot1, place.slot2);
+}
+
+template <Real S>
+void ContactProblem<S>::recall(const ContactColoring& colouring) {
+  parallelFor(rows.size() - colouring.loneCount(), chunk, [&](std::size_t i) {
+    const std::size_t k = colouring.loneCount() + i;
+    if (isPassed(k, colouring)) {
+      rows[k].slides = 0;
+      rows[k].sliding = false;
+      repeat(k);
+    }
+  });
+}
+
+template <Real S>
+detail::SolvedProblem<S> ContactProblem<S>::solved() const {
+  detail::SolvedProblem<S> all;
+  const int back = -speedExponent_;
+  for (std::size_t slot = 0; slot + 1 < bodies.size(); ++slot) {
+    all.bodies.push_back({detail::scaled<S>(initial[slot].v, back), detail::scaled<S>(initial[slot].s, back),
+                          detail::scaled<S>(bodies[slot].v, back), detail::scaled<S>(bodies[slot].s, back),
+                          watch.holds() ? watch.ways()[slot] : S(0)});
+  }
+  for (std::size_t k = 0; k < rows.size() && watch.holds(); ++k) {
+    all.rows.push_back({watch.then()[k], approaches_[k], rows[k].target, S(static_cast<int>(rests_[k]))});
+  }
+  all.still = watch.still();
+  all.threshold = threshold_;
+  return all;
+}
+
+template <Real S>
+template <ContactBodies B>
+void ContactProblem<S>::resume(const detail::SolvedProblem<S>& all, const B& source,
+                               const ContactColoring& colouring, const ContactKinds& kinds) {
+  friction = kinds.rub || kinds.turn;
+  again = false;
+  gatherBodies(source, colouring, S(0));
+  std::vector<S> ways(bodies.size(), S(0));
+  for (std::size_t slot = 0; slot < all.bodies.size(); ++slot) {
+    initial[slot].v = speedIn(all.bodies[slot].v0);
+    initial[slot].s = speedIn(all.bodies[slot].s0);
+    bodies[slot].v = speedIn(all.bodies[slot].v);
+    bodies[slot].s = speedIn(all.bodies[slot].s);
+    ways[slot] = all.bodies[slot].way;
+  }
+  rows.resize(all.rows.size());
+  rests_.resize(all.rows.size());
+  approaches_.resize(all.rows.size());
+  std::vector<S> then(all.rows.size());
+  for (std::size_t k = 0; k < all.rows.size(); ++k) {
+    then[k] = all.rows[k].then;
+    approaches_[k] = all.rows[k].approach;
+    rows[k].target = all.rows[k].target;
+    rests_[k] = all.rows[k].rest == S(0)   ? RowRest::Not
+                : all.rows[k].rest == S(1) ? RowRest::Free
+                                           : RowRest::Loaded;
+  }
+  watch.restore(all.still, std::move(ways), std::move(then));
+  watch.setHolds(!all.rows.empty());
+  threshold_ = all.threshold;
+}
+
+}  // namespace gravel
