@@ -28,7 +28,7 @@ if(GRAVEL_SANITIZE)
   target_compile_options(gravel_own INTERFACE ${gravel_sanitizer_flags})
   target_link_options(gravel_own INTERFACE ${gravel_sanitizer_flags})
   if("address" IN_LIST GRAVEL_SANITIZE)
-    list(APPEND gravel_test_environment "ASAN_OPTIONS=detect_stack_use_after_return=1:strict_init_order=1")
+    list(APPEND gravel_test_environment "ASAN_OPTIONS=detect_stack_use_after_return=1:strict_init_order=1:handle_sigill=1")
     list(APPEND gravel_test_environment "UBSAN_OPTIONS=print_stacktrace=1")
     # LLVM's OpenMP loses a block when the number of threads changes; a program without gravel shows the same.
     list(APPEND gravel_test_environment

@@ -1,6 +1,7 @@
 #include "laws/laws.hpp"
 #include "scenes/scenes.hpp"
 #include "support/catch.hpp"
+#include "support/other_spaces.hpp"
 
 #include <numeric>
 
@@ -123,6 +124,7 @@ TEST_CASE("A permutation of bodies with their ids kept changes no bit of contact
   }
 }
 
+#ifndef GRAVEL_TEST_SLOW  // see other_spaces.hpp
 TEST_CASE("All layouts give the same bits in double") {
   const std::vector<Body<double>> bodies = grains(200);
   const auto endOf = [&](auto layout) {
@@ -134,3 +136,4 @@ TEST_CASE("All layouts give the same bits in double") {
   CHECK(sameBits(soa, endOf(AoS{})));
   CHECK(sameBits(soa, endOf(AoSoA<8>{})));
 }
+#endif

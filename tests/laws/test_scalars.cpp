@@ -1,6 +1,7 @@
 #include "laws/laws.hpp"
 #include "scenes/scenes.hpp"
 #include "support/catch.hpp"
+#include "support/other_spaces.hpp"
 
 using namespace gravel;
 using namespace gravel::test;

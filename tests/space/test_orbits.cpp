@@ -1,6 +1,7 @@
 #include "laws/laws.hpp"
 #include "scenes/scenes.hpp"
 #include "support/catch.hpp"
+#include "support/other_spaces.hpp"
 #include "support/temporary_file.hpp"
 
 using namespace gravel;
@@ -182,7 +183,8 @@ TEST_CASE("Adaptive steps of Gauss-Radau are those it asks for, within the limit
 }
 
 TEMPLATE_TEST_CASE("Orbits saved and taken up go on bit for bit", "",
-                   GRAVEL_TEST_TYPES((std::pair<double, SoA>), (std::pair<float, AoSoA<8>>))) {
+                   GRAVEL_TEST_TYPES((std::pair<double, SoA>), (std::pair<float, SoA>),
+                                     (std::pair<double, AoSoA<8>>))) {
   using S = typename TestType::first_type;
   using Layout = typename TestType::second_type;
   const TemporaryFile file("orbits");

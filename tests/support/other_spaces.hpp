@@ -1,0 +1,18 @@
+#pragma once
+
+/// Spaces of other scalars and layouts that several tests need. Each is made once, in space_of_*.cpp: a
+/// minute of compiling, which every test that made its own would take again. Sanitizers go without them:
+/// there bodies of all layouts and scalars run in bodies/, and whole spaces of two users' storages in
+/// laws/test_own_storage.cpp.
+
+#include "support/catch.hpp"
+#include <gravel/space/space.hpp>
+
+#ifndef GRAVEL_TEST_SLOW
+namespace gravel {
+extern template class Space<float, SoA>;
+extern template class Space<long double, SoA>;
+extern template class Space<double, AoS>;
+extern template class Space<double, AoSoA<8>>;
+}  // namespace gravel
+#endif

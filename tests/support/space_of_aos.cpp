@@ -1,0 +1,3 @@
+#include "support/other_spaces.hpp"
+
+template class gravel::Space<double, gravel::AoS>;
