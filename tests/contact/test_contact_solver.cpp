@@ -644,6 +644,50 @@ TEST_CASE("tiny numbers: speeds of 1e-310 and masses of 1e-300 obey the same law
   CHECK_THAT(pair[1].velocity()[0], WithinRel(3e-310, 1e-12));
 }
 
+TEST_CASE("a solver that knows ordinary speeds and masses takes tiny ones as a new one does, and back") {
+  const CounterRandom random(6);
+  std::uint64_t counter = 0;
+  std::vector<Body<double>> crowd;
+  for (int i = 0; i < 30; ++i) {
+    crowd.push_back(randomBody<double>(random, counter));
+    crowd.back().radius = 0.5;
+    for (int c = 0; c < 3; ++c) {
+      crowd.back().position[c] = random.uniform(counter++, -1.2, 1.2);
+    }
+  }
+  const Material<double> material{0.5, 0.4, 0.3, 0.2};
+  ContactSettings<double> settings;
+  settings.warmStart = false;
+  ContactSolver<double> used;
+  used.setSettings(settings);
+  std::vector<Contact<double>> contacts;
+  for (const auto& [speed, mass] : {std::pair(1.0, 1.0), std::pair(0x1p-1000, 1.0), std::pair(1.0, 0x1p-997),
+                                    std::pair(1.0, 1.0), std::pair(0x1p900, 1.0), std::pair(1.0, 1.0)}) {
+    Bodies<double, SoA> bodies;
+    for (Body<double> body : crowd) {
+      body.mass *= mass;
+      body.velocity *= speed;
+      body.angularVelocity *= speed;
+      bodies.add(body);
+    }
+    if (contacts.empty()) {
+      contacts = contactsOf(bodies, material);
+      used.begin(contacts, bodies);
+    }
+    REQUIRE(contacts.size() > 30);
+    Bodies<double, SoA> other = bodies;
+    ContactSolver<double> fresh;
+    fresh.setSettings(settings);
+    fresh.solve(contacts, other, 0.01);
+    used.solve(bodies, 0.01);  // the same contacts once more
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      CHECK(bodies[i].velocity() == other[i].velocity());
+      CHECK(bodies[i].angularVelocity() == other[i].angularVelocity());
+      CHECK(detail::maxAbs(Vector3<double>(bodies[i].velocity())) < 100.0 * speed);
+    }
+  }
+}
+
 TEST_CASE("a resting contact does not bounce on what gravity gives it in a step; a faster one does") {
   const double g = 9.81;
   const double dt = 1e-2;

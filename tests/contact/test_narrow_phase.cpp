@@ -136,3 +136,77 @@ TEST_CASE("across the face of a sheared domain a contact carries the drift of th
   CHECK(bodies[0].velocity()[1] < 0.0);
   CHECK(bodies[1].velocity()[1] == -bodies[0].velocity()[1]);
 }
+
+TEST_CASE("what is known of all contacts together is found with them") {
+  Bodies<double, SoA> bodies = randomCloud<double>(150, 5.0, 2);
+  for (std::size_t i = 0; i < bodies.size(); i += 7) {
+    bodies[i].setMaterial(MaterialId{1});
+  }
+  std::vector<Material<double>> materials{{0.5, 0.0, 0.0, 0.0}, {0.5, 0.4, 0.4, 0.0}};
+  std::vector<HalfSpace<double>> walls{{{0, 0, 1}, -2.0, {}}, {{0, 0, -1}, -2.5, {}, {0.1, 0, 0}, 1}};
+  NarrowPhaseSettings<double> settings;
+  NarrowPhase<double> narrow;
+  std::vector<Contact<double>> contacts;
+  const auto check = [&](std::size_t others) {
+    narrow.find(allPairs(bodies), bodies, Domain<double>::open(), materials, walls, settings, contacts);
+    const ContactFacts<double>& found = narrow.facts();
+    const auto listed =
+        ContactFacts<double>::of(std::span<const Contact<double>>(contacts), bodies, settings.before);
+    bool rubs = false;
+    bool drifts = false;
+    double overlap = 0.0;
+    double radius = 1e300;
+    for (const Contact<double>& c : contacts) {
+      rubs = rubs || c.material.staticFriction > 0.0;
+      drifts = drifts || c.drift != Vector3<double>::Zero();
+      overlap = std::max(overlap, -c.gap);
+      const double r1 = bodies[c.first].radius();
+      const double r2 = c.second == staticPartner ? r1 : bodies[c.second].radius();
+      radius = std::min({radius, r1, r2});
+    }
+    for (const ContactFacts<double>& facts : {found, listed}) {
+      CHECK(facts.kinds.rub == rubs);
+      CHECK(facts.kinds.drift == drifts);
+      CHECK_FALSE(facts.kinds.turn);
+      CHECK(facts.overlap == overlap);
+      CHECK(facts.radius == radius);
+      CHECK(facts.others == std::min(others, contacts.size()));
+    }
+  };
+  constexpr auto all = std::numeric_limits<std::size_t>::max();
+  check(all);  // compared with none
+  std::vector<ContactName> names;
+  for (const Contact<double>& c : contacts) {
+    names.push_back(ContactName::of(c));
+  }
+  settings.before = names;
+  check(0);
+  names[7].second += 1;
+  names.back().keys.second += 1;
+  settings.before = names;
+  check(2);
+  materials[0].staticFriction = materials[1].staticFriction = 0.0;
+  materials[0].kineticFriction = materials[1].kineticFriction = 0.0;
+  walls.pop_back();
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    bodies[i].position() *= 2.0;
+  }
+  settings.before = {};
+  check(all);
+}
+
+TEST_CASE("names are found from any place in their list as from its begin") {
+  std::vector<ContactName> list;
+  for (std::uint64_t k = 0; k < 120; ++k) {
+    list.push_back({{k / 6, 2 * (k % 6) + 1}, 0, 0});
+  }
+  const std::span<const ContactName> names(list);
+  for (std::uint64_t first = 0; first < 21; ++first) {
+    for (std::uint64_t second = 0; second < 14; ++second) {
+      const auto found = placeOf(names, {first, second});
+      for (std::size_t from = 0; from <= names.size() + 1; ++from) {
+        REQUIRE(placeOf(names, {first, second}, from) == found);
+      }
+    }
+  }
+}

@@ -12,7 +12,8 @@ CorrectionReport<S> correct(B& bodies, const std::vector<Contact<S>>& contacts,
                             const CorrectionSettings<S>& settings, PositionalCorrection<S>& correction) {
   ContactColoring coloring;
   coloring.build(std::span<const Contact<S>>(contacts), bodies);
-  return correction.apply(contacts, coloring, bodies, settings);
+  return correction.apply(contacts, coloring, bodies, settings,
+                          ContactFacts<S>::of(std::span<const Contact<S>>(contacts), bodies));
 }
 
 template <class S>

@@ -74,6 +74,24 @@ inline auto placeOf(std::span<const ContactName> names, const ContactKeys& keys)
       [](const ContactName& name, const ContactKeys& wanted) { return name.keys < wanted; });
 }
 
+/// The same, the sooner the less far it is behind `from`.
+inline auto placeOf(std::span<const ContactName> names, const ContactKeys& keys, std::size_t from) {
+  if (from > names.size() || (from > 0 && !(names[from - 1].keys < keys))) {
+    return placeOf(names, keys);
+  }
+  for (std::size_t step = 0; step < 8; ++step, ++from) {
+    if (from == names.size() || !(names[from].keys < keys)) {
+      return names.begin() + static_cast<std::ptrdiff_t>(from);
+    }
+  }
+  std::size_t step = 8;
+  for (; from + step < names.size() && names[from + step].keys < keys; step *= 2) {
+    from += step;
+  }
+  const std::span<const ContactName> near = names.subspan(from, std::min(step, names.size() - from));
+  return names.begin() + static_cast<std::ptrdiff_t>(from) + (placeOf(near, keys) - near.begin());
+}
+
 /// What occurs among the contacts of a step.
 struct ContactKinds {
   bool rub = false;     ///< friction

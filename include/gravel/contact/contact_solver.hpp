@@ -50,25 +50,21 @@ class ContactSolver {
 
   /// Takes the contacts of a step and colours them; solve() and correctPositions() follow in either order.
   /// What the last contacts are remembered by is handed on to those with the same keys. \param contacts
-  /// sorted by keys; kept as a view, whose geometry may be renewed before solve()
+  /// sorted by keys; kept as a view, whose geometry may be renewed before solve(), after correctPositions()
   template <ContactBodies B>
   void begin(std::span<const Contact<S>> contacts, const B& bodies) {
+    begin(contacts, bodies, ContactFacts<S>::of(contacts, bodies, names_));
+  }
+  /// \param facts of these contacts, compared with names()
+  template <ContactBodies B>
+  void begin(std::span<const Contact<S>> contacts, const B& bodies, const ContactFacts<S>& facts) {
     contacts_ = contacts;
+    facts_ = facts;
     fresh_ = true;
     goesOn_ = false;
     const bool asMany = contacts.size() == names_.size() && contacts.size() == coloring_.rows().size();
-    const Findings found =
-        orderedSum(contacts.size(), chunk, Findings{}, [&](std::size_t begin, std::size_t end) {
-          Findings part;
-          for (std::size_t k = begin; k < end; ++k) {
-            part.kinds.include(contacts[k]);
-            part.others += asMany && names_[k] == ContactName::of(contacts[k]) ? 0 : 1;
-          }
-          return part;
-        });
-    kinds_ = found.kinds;
     // The same pairs of the same bodies: colours, and who is remembered, stay.
-    if (!asMany || found.others > 0 || !sameMovable(bodies)) {
+    if (!asMany || facts.others > 0 || !sameMovable(bodies)) {
       before_ = inRows_ ? inOrder(rowImpulses_) : std::move(restored_);
       namesBefore_.swap(names_);
       coloring_.build(contacts, bodies);
@@ -95,7 +91,7 @@ class ContactSolver {
     if (!contacts.empty()) {
       // Forces that last give impulses in proportion of the steps.
       const S ratio = settings_.warmStart && memoryStep_ > S(0) ? S(dt / memoryStep_) : S(0);
-      problem_.gather(contacts, bodies, coloring_, dt, settings_, kinds_, rowsBefore_, ratio, fresh_,
+      problem_.gather(contacts, bodies, coloring_, dt, settings_, facts_.kinds, rowsBefore_, ratio, fresh_,
                       goesOn && ratio > S(0),
                       [&](std::size_t k) { return detail::RowImpulses<S>::wrongAt(problem_, k); });
       fresh_ = false;
@@ -127,7 +123,7 @@ class ContactSolver {
   /// Opens the overlaps of the contacts of begin() by moving bodies.
   template <ContactBodies B>
   CorrectionReport<S> correctPositions(B& bodies, const CorrectionSettings<S>& settings) {
-    return correction_.apply(contacts_, coloring_, bodies, settings);
+    return correction_.apply(contacts_, coloring_, bodies, settings, facts_);
   }
 
   /// The contacts of begin() by name; the view holds until the next one.
@@ -136,7 +132,7 @@ class ContactSolver {
   const std::vector<Displacement<S>>& displacements() const { return correction_.displacements(); }
 
   /// Whether spin matters to a contact of begin().
-  bool hasFriction() const { return kinds_.rub || kinds_.turn; }
+  bool hasFriction() const { return facts_.kinds.rub || facts_.kinds.turn; }
 
   /// Contacts of begin(), which are the caller's, and the impulses [N s] of the last solve() in their order.
   /// O(contacts) once a solve; the view holds until the next one.
@@ -165,11 +161,12 @@ class ContactSolver {
                       [&](std::size_t begin, std::size_t end) {
                         Sums sums = Sums::Zero();
                         for (std::size_t r = begin; r < end; ++r) {
-                          const S j_n = rowImpulses_.normal(r);
-                          if (j_n > S(0)) {
-                            const detail::SolverRow<S>& row = problem_.rows[r];
-                            const Vector3<S> change = changes_[row.slot2] - changes_[row.slot1];
-                            sums += Sums(j_n * row.n.dot(change), rowImpulses_.tangential(r).dot(change));
+                          const ContactColoring::Row& place = coloring_.rows()[r];
+                          const Vector3<S> change = changes_[place.slot2] - changes_[place.slot1];
+                          // None between two that fall alike: their row is not fetched.
+                          if (change != Vector3<S>::Zero() && rowImpulses_.normal(r) > S(0)) {
+                            sums += Sums(rowImpulses_.normal(r) * problem_.rows[r].n.dot(change),
+                                         rowImpulses_.tangential(r).dot(change));
                           }
                         }
                         return sums;
@@ -203,7 +200,7 @@ class ContactSolver {
   void resume(const detail::SolvedProblem<S>& solved, const B& bodies) {
     if (solved.bodies.size() == coloring_.bodies().size() && !solved.bodies.empty() &&
         (solved.rows.size() == coloring_.rows().size() || solved.rows.empty())) {
-      problem_.resume(solved, bodies, coloring_, kinds_);
+      problem_.resume(solved, bodies, coloring_, facts_.kinds);
       goesOn_ = true;
     }
   }
@@ -234,17 +231,6 @@ class ContactSolver {
 
  private:
   static constexpr std::size_t chunk = 512;
-
-  /// What begin() looks for in the contacts.
-  struct Findings {
-    ContactKinds kinds;
-    std::size_t others = 0;  ///< that are not those of before
-    Findings& operator+=(const Findings& more) {
-      kinds += more.kinds;
-      others += more.others;
-      return *this;
-    }
-  };
 
   template <class B>
   bool sameMovable(const B& bodies) const {
@@ -293,7 +279,7 @@ class ContactSolver {
   std::variant<SequentialImpulses<S>> algorithm_;
   ContactSettings<S> settings_;
   ContactColoring coloring_;
-  ContactKinds kinds_;
+  ContactFacts<S> facts_;  ///< of the contacts of begin()
   ContactProblem<S> problem_;
   ContactEnergy<S> energy_;
   PositionalCorrection<S> correction_;

@@ -77,8 +77,9 @@ class ImpactForecast {
         predictPairs(scene, pairs.subspan(c * chunk, std::min(chunk, pairs.size() - c * chunk)), parts_[c]);
       } else {
         const std::size_t begin = (c - bodiesFrom) * chunk;
+        std::size_t place = 0;
         for (std::size_t k = begin; k < std::min(begin + chunk, n); ++k) {
-          predictWalls(scene, nearWalls ? (*nearWalls)[k] : static_cast<std::uint32_t>(k), parts_[c]);
+          predictWalls(scene, nearWalls ? (*nearWalls)[k] : static_cast<std::uint32_t>(k), place, parts_[c]);
         }
       }
     });
@@ -117,8 +118,9 @@ class ImpactForecast {
     }
   }
 
+  /// \param place in the list of those held, which bodies follow in the order of their ids
   template <class Scene>
-  void predictWalls(const Scene& scene, std::uint32_t i, std::vector<Event>& out) const {
+  void predictWalls(const Scene& scene, std::uint32_t i, std::size_t& place, std::vector<Event>& out) const {
     const S radius = scene.bodies.radii()[i];
     if (!(radius > S(0)) || !detail::isMovable(scene.bodies, i)) {
       return;
@@ -131,7 +133,9 @@ class ImpactForecast {
       if (const auto t = timeOfImpact<S>(flightOf(scene, i, wall), wall.normal, radius, S(0))) {
         const std::uint64_t key1 = scene.bodies.ids()[i];
         const std::uint64_t key2 = boundaryKey(wall.number);
-        if (!isListed(scene.held, {key1, key2})) {
+        const auto held = placeOf(scene.held, {key1, key2}, place);
+        place = static_cast<std::size_t>(held - scene.held.begin());
+        if (held == scene.held.end() || held->keys != ContactKeys{key1, key2}) {
           out.push_back({*t, i, staticPartner, key1, key2, 0, 0, w});
         }
       }

@@ -4,7 +4,7 @@
 /// From candidates to contacts: which pairs really touch, where, and with what surfaces.
 
 #include <gravel/contact/contact.hpp>
-#include <gravel/contact/contact_bodies.hpp>
+#include <gravel/contact/contact_facts.hpp>
 #include <gravel/contact/resting_gap.hpp>
 #include <gravel/core/parallel.hpp>
 #include <gravel/spatial/pair.hpp>
@@ -29,6 +29,7 @@ struct NarrowPhaseSettings {
   Scalar step = Scalar(0);
   /// Who rests on whom, sorted: only these stay contacts with a gap. Without it every pair so near does.
   std::optional<std::span<const ContactName>> resting = std::nullopt;
+  std::span<const ContactName> before{};  ///< with which those found are compared: facts()
 };
 
 /// Turns candidate pairs and boundaries into the list of contacts, sorted by keys. Keeps its workspace from
@@ -84,14 +85,14 @@ class NarrowPhase {
     merge(used, bodies, domain, materials, settings, out);
   }
 
+  /// Of the contacts of the last find().
+  const ContactFacts<S>& facts() const { return facts_; }
+
  private:
   static constexpr std::size_t chunk = 2048;
 
   /// Where a chunk has got to in the list of those who rest; its own pairs come in the same order.
-  struct Cursor {
-    std::size_t place = 0;
-    bool placed = false;
-  };
+  using Cursor = std::size_t;
 
   /// Calls append(k, part, cursor) for k = 0 … n-1 in chunks. \return their number
   template <class Part, class Append>
@@ -103,7 +104,7 @@ class NarrowPhase {
     parallelForChunks<Share::Alike>(n, chunk, [&](std::size_t begin, std::size_t end) {
       Part& part = parts[begin / chunk];
       part.clear();
-      Cursor cursor;
+      Cursor cursor = 0;
       for (std::size_t k = begin; k < end; ++k) {
         append(k, part, cursor);
       }
@@ -138,13 +139,20 @@ class NarrowPhase {
     }
     const Start last = starts_.back();
     out.resize(last.place + boundaryContacts_.size() - last.wall);
+    factsOfParts_.assign(used + 1, ContactFacts<S>{});
+    const auto look = [&](std::size_t k, const S& r, ContactFacts<S>& part) {
+      part.include(out[k], r, detail::isNamed(settings.before, k, out[k]));
+    };
     parallelForTasks<Share::Alike>(used, [&](std::size_t p) {
       auto [wall, place] = starts_[p];
+      ContactFacts<S> part;
       for (const Pair& pair : parts_[p]) {
         const auto [i, j] = pair;
         const ContactKeys keys = keysOf(pair, bodies);
         while (wall < starts_[p + 1].wall && before(boundaryContacts_[wall], keys)) {
-          out[place++] = boundaryContacts_[wall++];
+          out[place] = boundaryContacts_[wall++];
+          look(place, bodies.radii()[out[place].first], part);
+          ++place;
         }
         Vector3<S> drift;
         const Vector3<S> r_ij = separation(pair, domain, settings, drift);
@@ -153,20 +161,29 @@ class NarrowPhase {
                                           keys.second, settings.epsilon);
         const std::uint32_t m_i = bodies.materials()[i];
         const std::uint32_t m_j = bodies.materials()[j];
-        out[place++] = Contact<S>{i,
-                                  j,
-                                  keys.first,
-                                  keys.second,
-                                  touch.normal,
-                                  touch.gap,
-                                  touch.arm1,
-                                  touch.arm2,
-                                  m_i == m_j ? materials[m_i] : mix(materials[m_i], materials[m_j]),
-                                  drift};
+        out[place] = Contact<S>{i,
+                                j,
+                                keys.first,
+                                keys.second,
+                                touch.normal,
+                                touch.gap,
+                                touch.arm1,
+                                touch.arm2,
+                                m_i == m_j ? materials[m_i] : mix(materials[m_i], materials[m_j]),
+                                drift};
+        look(place, detail::smallerRadius<S>(spheres_[i].r, spheres_[j].r), part);
+        ++place;
       }
+      factsOfParts_[p] = part;
     });
-    std::copy(boundaryContacts_.begin() + static_cast<std::ptrdiff_t>(last.wall), boundaryContacts_.end(),
-              out.begin() + static_cast<std::ptrdiff_t>(last.place));
+    for (std::size_t wall = last.wall, place = last.place; place < out.size(); ++wall, ++place) {
+      out[place] = boundaryContacts_[wall];
+      look(place, bodies.radii()[out[place].first], factsOfParts_[used]);
+    }
+    facts_ = {};
+    for (const ContactFacts<S>& part : factsOfParts_) {
+      facts_ += part;
+    }
   }
 
   template <class B>
@@ -195,14 +212,9 @@ class NarrowPhase {
       return true;
     }
     const std::span<const ContactName> resting = *settings.resting;
-    if (!cursor.placed || (cursor.place > 0 && !(resting[cursor.place - 1].keys < keys))) {
-      cursor.place = static_cast<std::size_t>(placeOf(resting, keys) - resting.begin());
-      cursor.placed = true;
-    }
-    while (cursor.place < resting.size() && resting[cursor.place].keys < keys) {
-      ++cursor.place;
-    }
-    return cursor.place < resting.size() && resting[cursor.place].keys == keys;
+    const auto found = placeOf(resting, keys, cursor);
+    cursor = static_cast<std::size_t>(found - resting.begin());
+    return found != resting.end() && found->keys == keys;
   }
 
   static const Material<S>& surface(std::span<const Material<S>> materials, std::uint32_t id) {
@@ -299,6 +311,8 @@ class NarrowPhase {
   std::vector<std::vector<Contact<S>>> wallParts_;
   std::vector<Start> starts_;
   std::vector<Contact<S>> boundaryContacts_;
+  std::vector<ContactFacts<S>> factsOfParts_;
+  ContactFacts<S> facts_;
 };
 
 }  // namespace gravel

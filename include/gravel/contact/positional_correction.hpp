@@ -4,6 +4,7 @@
 /// Removes overlap by moving positions: no energy of motion is made.
 
 #include <gravel/contact/contact_coloring.hpp>
+#include <gravel/contact/contact_facts.hpp>
 #include <gravel/contact/row_watch.hpp>
 #include <gravel/contact/solver_rows.hpp>
 #include <gravel/core/parallel.hpp>
@@ -59,20 +60,19 @@ class PositionalCorrection {
  public:
   /// Moves the bodies so that each overlap is (1 - factor) of what it was, down to the slop, unless the cap
   /// holds it back.
-  /// \param colouring of these contacts
+  /// \param colouring of these contacts \param facts of them, overlaps as they are now
   template <ContactBodies B>
   CorrectionReport<S> apply(std::span<const Contact<S>> contacts, const ContactColoring& colouring, B& bodies,
-                            const CorrectionSettings<S>& settings) {
+                            const CorrectionSettings<S>& settings, const ContactFacts<S>& facts) {
     moved_.clear();
     CorrectionReport<S> report;
-    const Extremes all = extremesOf(contacts, bodies);
-    report.largestOverlap = all.overlap;
-    const S right = contacts.empty() ? S(0) : S(settings.precision * all.radius);
-    if (!(all.overlap > right)) {
+    report.largestOverlap = facts.overlap;
+    const S right = contacts.empty() ? S(0) : S(settings.precision * facts.radius);
+    if (!(facts.overlap > right)) {
       return report;
     }
     takeUp(colouring, bodies);
-    const S enough = std::max<S>(settings.tolerance * all.overlap, right);
+    const S enough = std::max<S>(settings.tolerance * facts.overlap, right);
     watch_.begin(shifts_.size(), contacts.size(), S(enough / S(2)));
     rows_.resize(contacts.size());
     filled_.assign(contacts.size(), 0);
@@ -136,16 +136,6 @@ class PositionalCorrection {
   };
   static constexpr std::size_t chunk = 512;
 
-  /// The largest overlap, and the smallest radius.
-  struct Extremes {
-    S overlap = S(0);
-    S radius = Eigen::NumTraits<S>::highest();
-    Extremes& operator+=(const Extremes& other) {
-      overlap = std::max<S>(overlap, other.overlap);
-      radius = std::min<S>(radius, other.radius);
-      return *this;
-    }
-  };
   /// What a sweep did.
   struct Opened {
     S largest = S(0);
@@ -156,25 +146,6 @@ class PositionalCorrection {
       return *this;
     }
   };
-
-  /// Of the two radii of a contact the smaller one that is not zero.
-  template <class B>
-  static S smallerRadius(const Contact<S>& c, const B& bodies) {
-    const S r1 = bodies.radii()[c.first];
-    const S r2 = c.second == staticPartner ? r1 : S(bodies.radii()[c.second]);
-    return r1 > S(0) && r2 > S(0) ? std::min<S>(r1, r2) : std::max<S>(r1, r2);
-  }
-
-  template <class B>
-  static Extremes extremesOf(std::span<const Contact<S>> contacts, const B& bodies) {
-    return orderedSum(contacts.size(), chunk, Extremes{}, [&](std::size_t begin, std::size_t end) {
-      Extremes part;
-      for (std::size_t k = begin; k < end; ++k) {
-        part += {S(-contacts[k].gap), smallerRadius(contacts[k], bodies)};
-      }
-      return part;
-    });
-  }
 
   template <class B>
   void takeUp(const ContactColoring& colouring, const B& bodies) {
@@ -194,7 +165,7 @@ class PositionalCorrection {
             const CorrectionSettings<S>& settings) const {
     const S overlap = -c.gap;
     const S kept =
-        std::max<S>(overlap - settings.cap * smallerRadius(c, bodies),
+        std::max<S>(overlap - settings.cap * detail::smallerRadius(c, bodies),
                     std::max<S>((S(1) - settings.factor) * overlap, std::min<S>(settings.slop, overlap)));
     const S m1 = shifts_[place.slot1].mass;
     const S m2 = shifts_[place.slot2].mass;

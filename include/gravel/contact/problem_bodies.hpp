@@ -62,46 +62,65 @@ class ProblemBodies {
     initial.resize(n + 1);
     accelerations_.resize(n + 1);
     watch.setHolds(watch.holds() && again && speedExponent_ == 0);
+    // Mostly nothing was to be scaled, and so it goes on: one look at a body is enough.
+    const bool plain = speedExponent_ == 0 && massExponent_ == 0;
     const Scales scales = orderedSum(n, chunk, Scales{}, [&](std::size_t begin, std::size_t end) {
       Scales part;
       for (std::size_t slot = begin; slot < end; ++slot) {
         Body now = take(source, colouring, slot);
         part += {std::max<S>(maxAbs(now.v), maxAbs(now.s)), now.inverseMass, now.inverseMass};
+        Body weighed = now;
+        weigh(weighed);
+        auto& start = initial[slot];
+        Vector3<S> dv = Vector3<S>::Zero();
+        Vector3<S> ds = Vector3<S>::Zero();
         if (again) {
           const Body& before = bodies[slot];
-          auto& start = initial[slot];
           if (watch.holds()) {
             watch.move(slot, Vector3<S>(now.v - start.v).norm() + Vector3<S>(now.s - start.s).norm());
           }
-          start.v = before.v - start.v;
-          start.s = before.s - start.s;
-          Body weighed = now;
-          weigh(weighed);
+          dv = before.v - start.v;
+          ds = before.s - start.s;
           part.others += weighed.inverseMass == before.inverseMass && weighed.spin == before.spin ? 0 : 1;
         }
-        bodies[slot] = now;
+        if (plain) {
+          start.v = now.v;
+          start.s = now.s;
+          weighed.v += ratio * dv;
+          weighed.s += ratio * ds;
+        } else {
+          start.v = dv;
+          start.s = ds;
+        }
+        bodies[slot] = plain ? weighed : now;
       }
       return part;
     });
+    const bool wasAgain = again;
     again = again && scales.others == 0;
     const int speedExponent = speedExponent_;
     const int massExponent = massExponent_;
-    accelerations_[n] = Vector3<S>::Zero();
-    initial[n].fall = S(0);
-    bodies[n] = Body{Vector3<S>::Zero(), S(0), Vector3<S>::Zero(), S(0)};
     speedExponent_ = scaleExponent<S>(scales.fastest, scales.fastest);
     massExponent_ = scaleExponent<S>(scales.lightest, scales.heaviest);
     sameScales_ = speedExponent == speedExponent_ && massExponent == massExponent_;
-    parallelFor(n + 1, chunk, [&](std::size_t slot) {
+    again = again && (sameScales_ || !plain);
+    accelerations_[n] = initial[n].v = initial[n].s = Vector3<S>::Zero();
+    initial[n].fall = S(0);
+    bodies[n] = Body{Vector3<S>::Zero(), S(0), Vector3<S>::Zero(), S(0)};
+    if (plain && sameScales_ && again == wasAgain) {
+      return;
+    }
+    parallelFor(n, chunk, [&](std::size_t slot) {
       Body& b = bodies[slot];
-      if (speedExponent_ != 0) {
-        b.v = scaled<S>(b.v, speedExponent_);
-        b.s = scaled<S>(b.s, speedExponent_);
-      }
-      weigh(b);
       auto& start = initial[slot];
       const Vector3<S> dv = start.v;
       const Vector3<S> ds = start.s;
+      if (plain) {
+        b = take(source, colouring, slot);
+      }
+      b.v = scaled<S>(b.v, speedExponent_);
+      b.s = scaled<S>(b.s, speedExponent_);
+      weigh(b);
       start.v = b.v;
       start.s = b.s;
       if (again) {

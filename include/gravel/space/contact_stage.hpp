@@ -248,7 +248,8 @@ class ContactStage {
   void colour(const Bodies& bodies, Profiler& profiler) {
     if (!coloured_) {
       const Profiler::Scope scope(profiler, Phase::Colouring);
-      solver_.begin(contacts_, bodies);
+      solver_.begin(contacts_, bodies,
+                    known_ ? narrow_.facts() : ContactFacts<Scalar>::of(contacts_, bodies, solver_.names()));
       solver_.resume(resumed_, bodies);
       resumed_ = {};
       coloured_ = true;
@@ -258,6 +259,7 @@ class ContactStage {
   /// Others, or elsewhere, than those that solver_ knows.
   void contactsChanged() {
     coloured_ = false;
+    known_ = false;
     resumed_ = {};
   }
 
@@ -301,6 +303,7 @@ class ContactStage {
   std::vector<std::uint8_t> wasMoved_;     // by body: in the last separation
   bool acted_ = false;                     // the last solve changed velocities
   bool firstActed_ = false;                // so did that of the first half of this part, or of the last one
+  bool known_ = false;                     // narrow_.facts() are of the present contacts
   bool coloured_ = false;                  // solver_ knows the present contacts
   detail::SolvedProblem<Scalar> resumed_;  // what solver_ is to go on from once it has contacts_
 };

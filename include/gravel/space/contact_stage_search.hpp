@@ -26,16 +26,12 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
   }
   prepareSurfaces(config);
   NarrowPhaseSettings<Scalar> settings{time, config.epsilon, Scalar(0), h};
-  if (!goesOn) {
-    contactsChanged();
-    const Profiler::Scope scope(profiler, Phase::NarrowPhase);
-    narrow_.find(neighbours_.pairs(), bodies, domain, materials.entries(), walls_, settings, contacts_,
-                 nearBoundaries(bodies, Scalar(0)));
-    return;
+  if (goesOn) {
+    settings.resting = resting();
   }
-  settings.resting = resting();
+  settings.before = solver_.names();
   contactsChanged();
-  if (searched && settings.resting->empty() && report_.postponed == 0) {
+  if (goesOn && searched && settings.resting->empty() && report_.postponed == 0) {
     contacts_.clear();
     profiler.skip(Phase::NarrowPhase, "all that met on the way parted again");
     return;
@@ -43,6 +39,7 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
   const Profiler::Scope scope(profiler, Phase::NarrowPhase);
   narrow_.find(neighbours_.pairs(), bodies, domain, materials.entries(), walls_, settings, contacts_,
                nearBoundaries(bodies, Scalar(0)));
+  known_ = true;
 }
 
 template <Real Scalar, class Layout>

@@ -85,6 +85,9 @@ void compare(std::uint32_t i, const Positions& positions, const Radii& radii, co
              const Domain<S>& domain, const S& time, std::vector<Pair>& out) {
   const Vector3<S> x = positions[i];
   const S length_sq = way.squaredNorm();
+  using std::sqrt;
+  const S widest = slack + free + S(sqrt(length_sq));
+  const S rounded = S(1) + S(16) * roundoff<S>();
   const S r_i = radii[i];
   const std::uint64_t id = idKey(ids[i]);
   for (std::uint32_t j = 0; j < positions.size(); ++j) {
@@ -92,14 +95,19 @@ void compare(std::uint32_t i, const Positions& positions, const Radii& radii, co
     if (j == i || !(radii_ij > S(0))) {
       continue;
     }
-    using std::sqrt;
-    // Another course may take it anywhere within its half of the skin, which is this far at most.
-    const S far = std::max<S>(S(sqrt(wayOf<S>(travel, j).squaredNorm())), free);
-    const S reach = radii_ij + slack + far;
     const Vector3<S> r = domain.minimumImage(Vector3<S>(positions[j]) - x, time);
+    const S way_sq = wayOf<S>(travel, j).squaredNorm();
+    // Most are too far for any of what follows: (a + b)^2 <= 2 (a^2 + b^2).
+    const S near = radii_ij + widest;
+    if (r.squaredNorm() > S(2) * rounded * (near * near + way_sq)) {
+      continue;
+    }
+    // Another course may take it anywhere within its half of the skin, which is this far at most.
+    const S far = std::max<S>(S(sqrt(way_sq)), free);
+    const S reach = radii_ij + slack + far;
     // The nearest point of the way: x + way s, 0 <= s <= 1.
     const S s = length_sq > S(0) ? std::min<S>(S(1), std::max<S>(S(0), S(way.dot(r) / length_sq))) : S(0);
-    if (Vector3<S>(r - s * way).squaredNorm() <= reach * reach * (S(1) + S(16) * roundoff<S>())) {
+    if (Vector3<S>(r - s * way).squaredNorm() <= reach * reach * rounded) {
       if (id < idKey(ids[j])) {
         out.push_back({i, j});
       } else {

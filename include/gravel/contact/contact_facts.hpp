@@ -1,0 +1,89 @@
+#pragma once
+
+/// \file
+/// What has to be known of all contacts of a step together, before they are moved apart and solved.
+
+#include <gravel/contact/contact.hpp>
+#include <gravel/contact/contact_bodies.hpp>
+#include <gravel/core/check.hpp>
+#include <gravel/core/parallel.hpp>
+
+#include <algorithm>
+#include <span>
+#include <string>
+
+namespace gravel {
+
+/// Found by who makes the contacts, while each is at hand, or by of().
+template <Real S>
+struct ContactFacts {
+  ContactKinds kinds;
+  S overlap = S(0);                           ///< [m] the largest
+  S radius = Eigen::NumTraits<S>::highest();  ///< [m] the smallest
+  std::size_t others = 0;                     ///< that are not those of before, in their places
+
+  /// \param r the smaller of its radii  \param before its name is the one of before
+  void include(const Contact<S>& c, const S& r, bool before) {
+    kinds.include(c);
+    overlap = std::max<S>(overlap, S(-c.gap));
+    radius = std::min<S>(radius, r);
+    others += before ? 0 : 1;
+  }
+  ContactFacts& operator+=(const ContactFacts& more) {
+    kinds += more.kinds;
+    overlap = std::max<S>(overlap, more.overlap);
+    radius = std::min<S>(radius, more.radius);
+    others += more.others;
+    return *this;
+  }
+
+  /// \param before names of contacts, in the same order  \throws std::invalid_argument for a contact of a
+  /// body that is not there
+  template <ContactBodies B>
+  static ContactFacts of(std::span<const Contact<S>> contacts, const B& bodies,
+                         std::span<const ContactName> before = {});
+};
+
+namespace detail {
+
+/// Of two radii the smaller one that is not zero.
+template <Real S>
+S smallerRadius(const S& r1, const S& r2) {
+  return r1 > S(0) && r2 > S(0) ? std::min<S>(r1, r2) : std::max<S>(r1, r2);
+}
+
+/// The same of a contact.
+template <Real S, ContactBodies B>
+S smallerRadius(const Contact<S>& c, const B& bodies) {
+  const S r1 = bodies.radii()[c.first];
+  return c.second == staticPartner ? r1 : smallerRadius<S>(r1, S(bodies.radii()[c.second]));
+}
+
+/// Whether contact k of a list has the name that stands there in another one.
+template <Real S>
+bool isNamed(std::span<const ContactName> names, std::size_t k, const Contact<S>& c) {
+  return k < names.size() && names[k] == ContactName::of(c);
+}
+
+}  // namespace detail
+
+template <Real S>
+template <ContactBodies B>
+ContactFacts<S> ContactFacts<S>::of(std::span<const Contact<S>> contacts, const B& bodies,
+                                    std::span<const ContactName> before) {
+  return orderedSum(contacts.size(), 512, ContactFacts{}, [&](std::size_t begin, std::size_t end) {
+    ContactFacts part;
+    for (std::size_t k = begin; k < end; ++k) {
+      const Contact<S>& c = contacts[k];
+      const bool known = c.first < bodies.size() && (c.second < bodies.size() || c.second == staticPartner);
+      if (!known) {
+        detail::refuse("body of a contact", std::to_string(c.first) + ", " + std::to_string(c.second),
+                       "two bodies, below " + std::to_string(bodies.size()) + ", or a boundary");
+      }
+      part.include(c, detail::smallerRadius(c, bodies), detail::isNamed(before, k, c));
+    }
+    return part;
+  });
+}
+
+}  // namespace gravel
