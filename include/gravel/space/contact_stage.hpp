@@ -187,6 +187,7 @@ class ContactStage {
       resumed_ = solver_.solved();  // the solver counts bodies by ids: it goes on as if nothing had been
       coloured_ = false;
     }
+    known_ = false;  // indices are others
     moved_ = false;
   }
 
