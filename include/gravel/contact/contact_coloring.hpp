@@ -162,7 +162,7 @@ namespace detail {
 /// threads where they are many; chunks depend on their number alone.
 template <class T, class F>
 T sumOverRows(std::size_t begin, std::size_t end, const T& zero, F&& f) {
-  constexpr std::size_t chunk = 256;
+  constexpr std::size_t chunk = 128;  // small beside a colour's part of a thread: all end at once
   const auto run = [&](std::size_t from, std::size_t to) {
     T sum = zero;
     for (std::size_t k = from; k < to; ++k) {
@@ -170,7 +170,7 @@ T sumOverRows(std::size_t begin, std::size_t end, const T& zero, F&& f) {
     }
     return sum;
   };
-  if (end - begin < 2 * chunk) {  // not worth the threads
+  if (end - begin < 4 * chunk) {  // not worth the threads
     return run(begin, end);
   }
   return orderedSum(end - begin, chunk, zero,

@@ -56,6 +56,10 @@ class ContactEnergy {
     S size = S(0);  ///< of the terms that add up to it
     bool isReal() const { return sum > S(8) * Eigen::NumTraits<S>::epsilon() * size; }  // no rounding
   };
+  struct Run {
+    std::uint32_t island;
+    Gain gain;
+  };
   struct Island {
     S before = S(0);  ///< sum of J.u^-, of those that gain
     S beta = S(1);
@@ -182,17 +186,29 @@ class ContactEnergy {
     return any;
   }
 
-  /// Sums over the rows of an island that follow each other stay in registers: most are of one.
+  /// Most rows that follow each other are of one island: each run of them is summed by itself.
   void findGains() {
-    gains_.assign(islandOfSlot_.size(), Gain{});
-    for (std::size_t k = 0; k < terms_.size();) {
-      const std::uint32_t island = islandOfRow_[k];
-      Gain gain = gains_[island];
-      for (; k < terms_.size() && islandOfRow_[k] == island; ++k) {
-        gain.sum += terms_[k];
-        gain.size += terms_[k] < S(0) ? S(-terms_[k]) : terms_[k];
+    constexpr std::size_t piece = 2048;
+    const std::size_t pieces = (terms_.size() + piece - 1) / piece;
+    runs_.resize(std::max(runs_.size(), pieces));
+    parallelForChunks<Share::Alike>(terms_.size(), piece, [&](std::size_t begin, std::size_t end) {
+      std::vector<Run>& runs = runs_[begin / piece];
+      runs.clear();
+      for (std::size_t k = begin; k < end;) {
+        Run run{islandOfRow_[k], {}};
+        for (; k < end && islandOfRow_[k] == run.island; ++k) {
+          run.gain.sum += terms_[k];
+          run.gain.size += terms_[k] < S(0) ? S(-terms_[k]) : terms_[k];
+        }
+        runs.push_back(run);
       }
-      gains_[island] = gain;
+    });
+    gains_.assign(islandOfSlot_.size(), Gain{});
+    for (std::size_t c = 0; c < pieces; ++c) {
+      for (const Run& run : runs_[c]) {
+        gains_[run.island].sum += run.gain.sum;
+        gains_[run.island].size += run.gain.size;
+      }
     }
   }
 
@@ -256,8 +272,9 @@ class ContactEnergy {
   bool known_ = false;       ///< the islands are of these rows
   std::vector<std::uint32_t> islandOfSlot_;
   std::vector<std::uint32_t> islandOfRow_;
-  std::vector<Gain> gains_;      ///< by the slot that stands for the island
-  std::vector<Island> islands_;  ///< by the slot that stands for it
+  std::vector<std::vector<Run>> runs_;  ///< of rows
+  std::vector<Gain> gains_;             ///< by the slot that stands for the island
+  std::vector<Island> islands_;         ///< by the slot that stands for it
 };
 
 }  // namespace gravel

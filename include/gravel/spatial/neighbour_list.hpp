@@ -197,9 +197,19 @@ class NeighbourList {
     };
     const auto before = [&](const Pair& a, const Pair& b) { return keys(a) < keys(b); };
     std::sort(extra_.begin(), extra_.end(), before);
-    joined_.resize(pairs_.size() + extra_.size());
-    std::merge(pairs_.begin(), pairs_.end(), extra_.begin(), extra_.end(), joined_.begin(), before);
-    joined_.erase(std::unique(joined_.begin(), joined_.end()), joined_.end());
+    extra_.erase(std::unique(extra_.begin(), extra_.end()), extra_.end());
+    joined_.clear();
+    joined_.reserve(pairs_.size() + extra_.size());
+    auto from = pairs_.cbegin();  // few among many: those between two of them are copied as they are
+    for (const Pair& pair : extra_) {
+      const auto place = std::lower_bound(from, pairs_.cend(), pair, before);
+      joined_.insert(joined_.end(), from, place);
+      if (place == pairs_.cend() || *place != pair) {
+        joined_.push_back(pair);
+      }
+      from = place;
+    }
+    joined_.insert(joined_.end(), from, pairs_.cend());
   }
 
   template <class Positions, class Radii, class Ids, class Travel>
