@@ -3,8 +3,7 @@
 /// \file
 /// An order in which contacts can be solved at once: no two contacts of one colour share a movable body.
 
-#include <gravel/contact/contact.hpp>
-#include <gravel/contact/contact_bodies.hpp>
+#include <gravel/contact/contact_facts.hpp>
 #include <gravel/core/check.hpp>
 #include <gravel/core/parallel.hpp>
 
@@ -64,11 +63,7 @@ class ContactColoring {
       detail::refuse("number of contacts", std::to_string(contacts.size()), "below 2^32 - 1");
     }
     for (const Contact<S>& c : contacts) {
-      const bool known = c.first < bodies.size() && (c.second < bodies.size() || c.second == staticPartner);
-      if (!known || c.first == c.second) {
-        detail::refuse("body of a contact", std::to_string(c.first) + ", " + std::to_string(c.second),
-                       "two bodies, below " + std::to_string(bodies.size()) + ", or a boundary");
-      }
+      detail::requireBodies(c, bodies.size());
     }
     slotOfBody_.resize(std::max(slotOfBody_.size(), bodies.size()), none);
     bodyOfSlot_.clear();

@@ -37,14 +37,24 @@ struct ContactFacts {
     return *this;
   }
 
-  /// \param before names of contacts, in the same order  \throws std::invalid_argument for a contact of a
-  /// body that is not there
+  /// \param before names of contacts, in the same order
+  /// \throws std::invalid_argument for a contact of a body that is not there, or of a body with itself
   template <ContactBodies B>
   static ContactFacts of(std::span<const Contact<S>> contacts, const B& bodies,
                          std::span<const ContactName> before = {});
 };
 
 namespace detail {
+
+/// \throws std::invalid_argument for a contact of a body that is not among `count`, or of a body with itself
+template <Real S>
+void requireBodies(const Contact<S>& c, std::size_t count) {
+  const bool known = c.first < count && (c.second < count || c.second == staticPartner);
+  if (!known || c.first == c.second) {
+    refuse("body of a contact", std::to_string(c.first) + ", " + std::to_string(c.second),
+           "two bodies, below " + std::to_string(count) + ", or a boundary");
+  }
+}
 
 /// Of two radii the smaller one that is not zero.
 template <Real S>
@@ -75,11 +85,7 @@ ContactFacts<S> ContactFacts<S>::of(std::span<const Contact<S>> contacts, const 
     ContactFacts part;
     for (std::size_t k = begin; k < end; ++k) {
       const Contact<S>& c = contacts[k];
-      const bool known = c.first < bodies.size() && (c.second < bodies.size() || c.second == staticPartner);
-      if (!known) {
-        detail::refuse("body of a contact", std::to_string(c.first) + ", " + std::to_string(c.second),
-                       "two bodies, below " + std::to_string(bodies.size()) + ", or a boundary");
-      }
+      detail::requireBodies(c, bodies.size());
       part.include(c, detail::smallerRadius(c, bodies), detail::isNamed(before, k, c));
     }
     return part;

@@ -249,8 +249,11 @@ class ContactStage {
   void colour(const Bodies& bodies, Profiler& profiler) {
     if (!coloured_) {
       const Profiler::Scope scope(profiler, Phase::Colouring);
-      solver_.begin(contacts_, bodies,
-                    known_ ? narrow_.facts() : ContactFacts<Scalar>::of(contacts_, bodies, solver_.names()));
+      if (known_) {
+        solver_.begin(contacts_, bodies, narrow_.facts());
+      } else {
+        solver_.begin(contacts_, bodies);
+      }
       solver_.resume(resumed_, bodies);
       resumed_ = {};
       coloured_ = true;
