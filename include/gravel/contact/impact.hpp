@@ -76,6 +76,20 @@ struct FixedCandidates {
   void follow(const B&, std::uint32_t, const S&, std::vector<Pair>&) {}
 };
 
+/// How bodies will fly from where a step begins, while their accelerations last: for ImpactForecast alone.
+template <Real S>
+struct FlightFromStart {
+  S h;  ///< [s]
+  template <class B>
+  Vector3<S> velocity(const B& bodies, std::size_t i) const {
+    return Vector3<S>(bodies.velocities()[i]) + acceleration(bodies, i) * (h / S(2));
+  }
+  template <class B>
+  Vector3<S> acceleration(const B& bodies, std::size_t i) const {
+    return bodies.accelerations()[i];
+  }
+};
+
 /// How bodies drift: straight on. A course tells the mean velocity of body i over the step, x + v h being the
 /// place at its end, and the acceleration that bends its path; and deals a blow so that the same drift ends
 /// where the body is afterwards.

@@ -48,6 +48,8 @@ class ImpactEvents : private detail::ImpactForecast<S> {
   using typename Base::History;
 
  public:
+  using Base::foresees;
+
   /// Between the kick and the drift: changes positions, velocities and spins so that the drift ends where the
   /// bodies are after all impacts.
   /// \param near  `pairs()`: candidates sorted by ids, every pair that may touch in the step; `version()`: a

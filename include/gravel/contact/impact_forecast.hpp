@@ -17,6 +17,18 @@ namespace gravel::detail {
 /// The events to come of a step in the order of (time, keys), and what each body has been through.
 template <Real S>
 class ImpactForecast {
+ public:
+  /// Whether an impact will happen, with all bodies on these courses. The arguments are those of
+  /// ImpactEvents::resolve().
+  template <ContactBodies B, class Course>
+  bool foresees(const B& bodies, std::span<const Pair> pairs, const Domain<S>& domain,
+                std::span<const HalfSpace<S>> walls, const ImpactSettings<S>& settings,
+                const std::optional<std::span<const std::uint32_t>>& nearWalls, const Course& course) {
+    predictAll(Scene<const B, const Course>{bodies, domain, {}, walls, {}, settings, course}, pairs,
+               nearWalls);
+    return !queue_.empty();
+  }
+
  protected:
   template <class B, class Course>
   struct Scene {

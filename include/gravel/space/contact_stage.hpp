@@ -58,6 +58,10 @@ class ContactStage {
   void strike(Bodies& bodies, const Config& config, const HillFrame<Scalar>& frame, const Scalar& time,
               const Scalar& h, Profiler& profiler);
 
+  /// Whether anything touches, or will in the next h [s] while accelerations last. Moves nothing.
+  bool foresees(const Bodies& bodies, const Config& config, const Scalar& time, const Scalar& h,
+                Profiler& profiler);
+
   /// Pairs of ids that a user lets merge after impacts inside the last part of the step.
   const std::vector<std::pair<std::uint64_t, std::uint64_t>>& merges() const { return impacts_.merges(); }
 
@@ -196,20 +200,7 @@ class ContactStage {
   std::vector<ContactImpulse<Scalar>> impulses() const;
 
   /// Why nothing can touch, or nullptr.
-  const char* reasonToSkip(const Bodies& bodies) const {
-    if (idle_) {
-      return "every body is fixed or asleep";
-    }
-    if (bodies.size() < 2 && boundaries.empty()) {
-      return "one body and no boundary";
-    }
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      if (Scalar(bodies.radii()[i]) > Scalar(0)) {
-        return nullptr;
-      }
-    }
-    return "no body has a radius";
-  }
+  const char* reasonToSkip(const Bodies& bodies) const;
 
   // Of bodies that sleep: contact_stage_sleep.hpp.
 
@@ -314,5 +305,6 @@ class ContactStage {
 
 }  // namespace gravel
 
+#include <gravel/space/contact_stage_impacts.hpp>
 #include <gravel/space/contact_stage_search.hpp>
 #include <gravel/space/contact_stage_sleep.hpp>

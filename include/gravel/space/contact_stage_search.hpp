@@ -1,12 +1,27 @@
 #pragma once
 
 /// \file
-/// Members of `ContactStage` that look for contacts and impacts, and say what touched.
+/// Members of `ContactStage` that look for contacts, and say what touched.
 
-#include <gravel/dynamics/epicycle_course.hpp>
 #include <gravel/space/contact_stage.hpp>
 
 namespace gravel {
+
+template <Real Scalar, class Layout>
+const char* ContactStage<Scalar, Layout>::reasonToSkip(const Bodies& bodies) const {
+  if (idle_) {
+    return "every body is fixed or asleep";
+  }
+  if (bodies.size() < 2 && boundaries.empty()) {
+    return "one body and no boundary";
+  }
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    if (Scalar(bodies.radii()[i]) > Scalar(0)) {
+      return nullptr;
+    }
+  }
+  return "no body has a radius";
+}
 
 template <Real Scalar, class Layout>
 void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& config, const Scalar& time,
@@ -40,25 +55,6 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
   narrow_.find(neighbours_.pairs(), bodies, domain, materials.entries(), walls_, settings, contacts_,
                nearBoundaries(bodies, Scalar(0)));
   known_ = true;
-}
-
-template <Real Scalar, class Layout>
-void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config,
-                                          const HillFrame<Scalar>& frame, const Scalar& time, const Scalar& h,
-                                          Profiler& profiler) {
-  const char* reason = reasonToSkip(bodies);
-  if (reason != nullptr) {
-    profiler.skip(Phase::Impacts, reason);
-    return;
-  }
-  if (frame.turns()) {
-    EpicycleCourse<Scalar> course(frame, h);
-    course.foresee(bodies);
-    strike(bodies, config, course, time, h, profiler);
-  } else {
-    StraightCourse<Scalar> course;
-    strike(bodies, config, course, time, h, profiler);
-  }
 }
 
 template <Real Scalar, class Layout>
@@ -160,69 +156,6 @@ void ContactStage<Scalar, Layout>::renewGeometry(const Bodies& bodies, const Con
       c.arm2 = touch->arm2;
     }
   });
-}
-
-template <Real Scalar, class Layout>
-template <class Course>
-void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, Course& course,
-                                          const Scalar& time, const Scalar& h, Profiler& profiler) {
-  const auto way = [&](std::size_t i) -> Vector3<Scalar> {
-    return detail::isMovable(bodies, i) ? Vector3<Scalar>(course.velocity(bodies, i) * h)
-                                        : Vector3<Scalar>(Vector3<Scalar>::Zero());
-  };
-  search(bodies, config, time, way, profiler);
-  searched_ = true;
-  const Profiler::Scope scope(profiler, Phase::Impacts);
-  prepareSurfaces(config);
-  struct Near {
-    NeighbourList<Scalar>& list;
-    const decltype(way)& travel;
-    const std::vector<Pair>& pairs() const { return list.pairs(); }
-    std::uint64_t version() const { return list.version(); }
-    void follow(const Bodies& all, std::uint32_t i, const Scalar&, std::vector<Pair>& out) {
-      list.follow(i, all.positions(), all.radii(), all.ids(), travel(i), travel, out);
-    }
-  } near{neighbours_, way};
-  const ImpactSettings<Scalar> settings{time, h, std::max(config.restitutionThreshold, config.epsilon),
-                                        config.epsilon};
-  const std::span<const Material<Scalar>> surfaces(materials.entries());
-  const std::span<const HalfSpace<Scalar>> walls(walls_);
-  const std::span<const ContactName> held = names();
-  ImpactReport<Scalar> blows;
-  if (collisionHook) {
-    const auto decide = [&](const Impact<Scalar>& impact, const Material<Scalar>& material,
-                            const Vector3<Scalar>& v1, const Vector3<Scalar>& v2,
-                            const Vector3<Scalar>& v_rel) {
-      const auto partner = [&](std::uint32_t i, std::uint64_t id, const Vector3<Scalar>& v) {
-        return typename Collision<Scalar>::Partner{BodyId{id},
-                                                   bodies.masses()[i],
-                                                   bodies.radii()[i],
-                                                   !detail::isMovable(bodies, i),
-                                                   MaterialId{bodies.materials()[i]},
-                                                   v,
-                                                   Vector3<Scalar>(bodies.angularVelocities()[i])};
-      };
-      return collisionHook(Collision<Scalar>{
-          Scalar(time + impact.time), partner(impact.first, impact.key1, v1),
-          partner(impact.second, impact.key2, v2), impact.normal, v_rel, material, impact.speed});
-    };
-    blows = impacts_.resolve(bodies, near, domain, surfaces, walls, held, settings, nearBoundaries(bodies, h),
-                             course, decide);
-  } else {
-    blows = impacts_.resolve(bodies, near, domain, surfaces, walls, held, settings, nearBoundaries(bodies, h),
-                             course);
-  }
-  neighbours_.add(impacts_.candidatesAdded(), bodies.ids());
-  for (const TurnChange<Scalar>& turn : impacts_.turns()) {
-    // The drift turns the body by the new spin for all of h.
-    auto&& q = bodies[turn.body].orientation();
-    q = rotated(rotated(Quaternion<Scalar>(q), turn.before, turn.time), turn.after, Scalar(-turn.time));
-  }
-  report_.impacts += blows.impacts;
-  report_.postponed += blows.postponed;
-  report_.restitutionLoss += blows.restitutionLoss;
-  report_.frictionLoss += blows.frictionLoss;
-  report_.driftWork += blows.driftWork;
 }
 
 template <Real Scalar, class Layout>

@@ -133,7 +133,8 @@ class Space : public Settings<Scalar> {
   /// The next step; where steps adapt, also the longest one from now on.
   void setTimeStep(Scalar dt);
   Scalar getPreviousTimeStep() const { return previous_dt_; }
-  /// Parts of the last step, each with its own contacts: config().contactSubsteps, or what was chosen.
+  /// Parts of the last step, each with its own contacts: config().contactSubsteps, or what was chosen; by an
+  /// integrator of several drifts its number of force evaluations where anything touched, else 1.
   std::size_t contactSubsteps() const { return parts_; }
 
   Scalar getG() const { return this->config_.G; }
@@ -227,7 +228,8 @@ class Space : public Settings<Scalar> {
   std::pair<Scalar, Scalar> timeAfter(const Scalar& h) const;
   bool areFewPoints() const;
   std::size_t moveFewPoints(const Scalar& h, const Scalar* until, Profiler::Step& timing);
-  std::size_t chooseParts(const Scalar& h) const;
+  bool hasSeveralDrifts() const;
+  std::size_t chooseParts(const Scalar& h);
   void advance(const Scalar& h, std::size_t part, std::size_t parts);
   void prepare();
   void wakeTheChanged();

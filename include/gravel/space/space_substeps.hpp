@@ -1,11 +1,12 @@
 #pragma once
 
 /// \file
-/// Members of `Space` that make the parts of a step: forces once a step, contacts in each part.
+/// Members of `Space` that make the parts of a step.
 ///
-/// In a step of length h in n parts the acceleration a_0 of the step before is held, and every part of length
-/// h/n is a whole step of its own under it: kick, contacts, impacts, drift, search, kick, contacts. Forces
-/// are evaluated once, at the places of the end, and the last kick makes up for the held ones:
+/// With one drift a step: forces once a step, contacts in each part. In a step of length h in n parts the
+/// acceleration a_0 of the step before is held, and every part of length h/n is a whole step of its own under
+/// it: kick, contacts, impacts, drift, search, kick, contacts. Forces are evaluated once, at the places of
+/// the end, and the last kick makes up for the held ones:
 ///   x_1 = x_0 + v_0 h + a_0 h^2/2,   v_1 = v_0 + a_0 h + (a_1 - a_0) h/2
 /// Without contacts that is velocity Verlet itself, for any n: of order 2, symplectic, reversible. What rests
 /// carries its weight in every part, so that nothing falls between two evaluations nor is thrown up by a kick
@@ -14,6 +15,12 @@
 /// meets a_0, off by h da/dt, as in a step of one part: order 2. In a shear-periodic domain the drift is no
 /// straight line: there a held force and one that kicks at the ends differ by O(h^3) a step, so that with
 /// n > 1 order 2 is kept, but reversible the map is only up to that.
+///
+/// With several drifts a step: stages fly ahead and back (Yoshida's first one by 1.35 h, the next one by
+/// -1.70 h), through whatever is in the way, and none of them ends where what rests could be held. So a step
+/// in which anything touches is made of as many parts as the method evaluates forces, each a step of velocity
+/// Verlet with forces of its own: it costs no more, contacts and impacts are what they are there, and the
+/// error of the others is that of h/n, of order 2. All other steps have the order of the method.
 
 #include <gravel/dynamics/epicycle.hpp>
 #include <gravel/space/space.hpp>
@@ -39,20 +46,28 @@ struct Space<Scalar, Layout>::Departure {
       space->resolveCollisions();
       space->contact_.endFirstHalf(space->force_, space->bodies_, kick);
     }
-    const HillFrame<Scalar> frame(space->contact_.domain);
-    if (frame.turns() || traitsOf(space->config_.integrator).forceEvaluations == 1) {  // one drift
-      space->contact_.strike(space->bodies_, space->config_, frame, Scalar(space->time_ + start), h,
-                             space->profiler_);
-    }
+    space->contact_.strike(space->bodies_, space->config_, HillFrame<Scalar>(space->contact_.domain),
+                           Scalar(space->time_ + start), h, space->profiler_);
   }
 };
 
-/// Into how many parts a step of length h is divided. Where motion chooses: no two bodies that touch move
-/// past each other by more than a quarter of the smaller radius r in a part, nor would at the speed of a fall
-/// by r at their relative acceleration, for the flanks of heaps creep in longer steps.
+/// Whether a step is several drifts, between which nothing can be held or struck.
 template <Real Scalar, class Layout>
-std::size_t Space<Scalar, Layout>::chooseParts(const Scalar& h) const {
+bool Space<Scalar, Layout>::hasSeveralDrifts() const {
+  return traitsOf(this->config_.integrator).stages.size() > 1;
+}
+
+/// Into how many parts a step of length h is divided. With one drift and where motion chooses: no two bodies
+/// that touch move past each other by more than a quarter of the smaller radius r in a part, nor would at the
+/// speed of a fall by r at their relative acceleration, for the flanks of heaps creep in longer steps.
+template <Real Scalar, class Layout>
+std::size_t Space<Scalar, Layout>::chooseParts(const Scalar& h) {
   using std::sqrt;
+  if (hasSeveralDrifts()) {
+    return contact_.foresees(bodies_, this->config_, time_, h, profiler_)
+               ? static_cast<std::size_t>(traitsOf(this->config_.integrator).forceEvaluations)
+               : 1;
+  }
   if (this->config_.contactSubsteps != 0) {
     return this->config_.contactSubsteps;
   }
@@ -90,7 +105,10 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
   const Scalar start = share(part);
   const Scalar end = last ? h : share(part + 1);
   contact_dt_ = parts == 1 ? h : Scalar(h / Scalar(static_cast<double>(parts)));
-  const Scalar late = Scalar(h - contact_dt_) / Scalar(2);  // [s] for which the last kick makes up
+  const bool apart = hasSeveralDrifts() && parts > 1;  // each part is a step with its own forces
+  const bool held = !last && !apart;                   // forces go on as they are
+  // [s] for which the last kick makes up
+  const Scalar late = apart ? Scalar(0) : Scalar(Scalar(h - contact_dt_) / Scalar(2));
   const HillFrame<Scalar> frame(contact_.domain);
   // Without mutual gravity runs are not long orbits, and nothing is carried; nor along an epicycle.
   const bool carry = this->config_.compensatedSummation && !(getG() == Scalar(0)) && !frame.turns() &&
@@ -101,21 +119,22 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
     detail::kickAndDrift(bodies_, time, Scalar(0), torques, lost);
   };
   const auto forces = [&](const Scalar& passed) {
-    if (!last) {
-      return;  // held
+    if (held) {
+      return;
     }
-    if (parts > 1) {
+    if (late > Scalar(0)) {
       kick(Scalar(-late));  // back to the velocity of the step's middle, as one part has it here
     }
     force_.evaluate(bodies_, getG(), this->config_.softening, contact_.domain,
                     Scalar(time_ + (start + passed)), profiler_);
-    if (parts > 1) {
+    if (late > Scalar(0)) {
       kick(late);
     }
   };
   const char* const alone = contact_.reasonToSkip(bodies_);
-  const Departure departure{this, start, contact_dt_, alone == nullptr || !contacts().empty()};
-  if (!departure) {
+  const bool quiet = hasSeveralDrifts() && !apart;
+  const Departure departure{this, start, contact_dt_, !quiet && (alone == nullptr || !contacts().empty())};
+  if (!departure && alone != nullptr) {
     profiler_.skip(Phase::Impacts, alone);
   }
   const auto arrival = [&] {
@@ -131,14 +150,15 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
     } else if (frame.turns()) {
       integrateEpicycle(frame, bodies_, contact_dt_, torques, forces, arrival, departure);
     } else {
-      integrate(this->config_.integrator, bodies_, contact_dt_, torques, forces, arrival, departure, lost);
+      integrate(apart ? IntegratorKind::VelocityVerlet : this->config_.integrator, bodies_, contact_dt_,
+                torques, forces, arrival, departure, lost);
     }
   }
   rememberPlaces();
   left_.correction += contact_.separationWork(force_, bodies_);
-  if (force_.hook && last) {
+  if (force_.hook && !held) {
     const Scalar power = force_.hookPower(bodies_);
-    left_.work -= (hookPower_ + power) * h / Scalar(2);
+    left_.work -= (hookPower_ + power) * (apart ? contact_dt_ : h) / Scalar(2);
   }
   const std::vector<std::pair<BodyId, BodyId>> merges = decideCollisions(Scalar(time_ + end));
   resolveCollisions();
@@ -147,6 +167,9 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
   if (!last && !merges.empty()) {
     force_.evaluate(bodies_, getG(), this->config_.softening, contact_.domain, Scalar(time_ + end),
                     profiler_);
+  }
+  if (force_.hook && apart) {
+    hookPower_ = force_.hookPower(bodies_);
   }
 }
 
