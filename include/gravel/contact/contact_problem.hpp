@@ -173,9 +173,9 @@ class ContactProblem : public detail::ProblemBodies<S> {
       return {impulseIn(S(ratio_ * last_->normal(k))),
               mobility * impulseIn(Vector3<S>(ratio_ * last_->tangential(k)))};
     }
-    return ratio_ > S(0) && last_->normal(k) > S(0)
-               ? detail::guessOf(rows[k], impulseIn(S(ratio_ * last_->normal(k))),
-                                 impulseIn(Vector3<S>(ratio_ * last_->tangential(k))))
+    const S jn = impulseIn(S(ratio_ * last_->normal(k)));
+    return jn > S(0) && !(jn > this->mostGuess_)
+               ? detail::guessOf(rows[k], jn, impulseIn(Vector3<S>(ratio_ * last_->tangential(k))))
                : detail::RowGuess<S>{};
   }
 

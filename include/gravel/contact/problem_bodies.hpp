@@ -68,7 +68,7 @@ class ProblemBodies {
       Scales part;
       for (std::size_t slot = begin; slot < end; ++slot) {
         Body now = take(source, colouring, slot);
-        part += {std::max<S>(maxAbs(now.v), maxAbs(now.s)), now.inverseMass, now.inverseMass};
+        part += {std::max<S>(maxAbs(now.v), maxAbs(now.s)), S(0), now.inverseMass, now.inverseMass};
         Body weighed = now;
         weigh(weighed);
         auto& start = initial[slot];
@@ -81,6 +81,7 @@ class ProblemBodies {
           }
           dv = before.v - start.v;
           ds = before.s - start.s;
+          part.change = std::max<S>(part.change, std::max<S>(maxAbs(dv), maxAbs(ds)));
           part.others += weighed.inverseMass == before.inverseMass && weighed.spin == before.spin ? 0 : 1;
         }
         if (plain) {
@@ -97,13 +98,17 @@ class ProblemBodies {
       return part;
     });
     const bool wasAgain = again;
-    again = again && scales.others == 0;
+    const S tooMuch = S(1) / Eigen::NumTraits<S>::epsilon();
+    again = again && scales.others == 0 &&
+            !(ratio * scales.change > tooMuch * scaled<S>(scales.fastest, speedExponent_));
     const int speedExponent = speedExponent_;
     const int massExponent = massExponent_;
     speedExponent_ = scaleExponent<S>(scales.fastest, scales.fastest);
     massExponent_ = scaleExponent<S>(scales.lightest, scales.heaviest);
     sameScales_ = speedExponent == speedExponent_ && massExponent == massExponent_;
     again = again && (sameScales_ || !plain);
+    mostGuess_ =
+        tooMuch * scaled<S>(scales.fastest, speedExponent_) * scaled<S>(scales.heaviest, massExponent_);
     accelerations_[n] = initial[n].v = initial[n].s = Vector3<S>::Zero();
     initial[n].fall = S(0);
     bodies[n] = Body{Vector3<S>::Zero(), S(0), Vector3<S>::Zero(), S(0)};
@@ -169,6 +174,8 @@ class ProblemBodies {
   int speedExponent_ = 0;
   int massExponent_ = 0;
   bool sameScales_ = false;  ///< as in the last problem
+  /// Above that an impulse of the last problem would leave nothing but its rounding: speeds have fallen.
+  S mostGuess_ = S(0);
 };
 
 }  // namespace gravel::detail

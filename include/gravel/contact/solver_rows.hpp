@@ -66,16 +66,19 @@ struct SolvedProblem {
   S threshold = S(0);
 };
 
-/// The largest speed, the masses > 0, and how many are not what they were.
+/// The largest speed, the largest change of one that is to be done again, the masses > 0, and how many are
+/// not what they were.
 template <Real S>
 struct ProblemScales {
   S fastest = S(0);
+  S change = S(0);
   S lightest = S(0);
   S heaviest = S(0);
   std::size_t others = 0;
   ProblemScales& operator+=(const ProblemScales& other) {
     others += other.others;
     fastest = std::max<S>(fastest, other.fastest);
+    change = std::max<S>(change, other.change);
     heaviest = std::max<S>(heaviest, other.heaviest);
     if (other.lightest > S(0) && !(lightest > S(0) && lightest <= other.lightest)) {
       lightest = other.lightest;
