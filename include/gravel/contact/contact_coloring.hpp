@@ -51,6 +51,11 @@ class ContactColoring {
   std::span<const std::uint32_t> bodies() const { return bodyOfSlot_; }
   std::uint32_t staticSlot() const { return static_cast<std::uint32_t>(bodyOfSlot_.size()); }
   bool movable(std::uint32_t slot) const { return movable_[slot] != 0; }
+  /// Slot of a body; staticSlot() if it has none.
+  std::uint32_t slotOf(std::uint32_t body) const {
+    const std::uint32_t slot = body < slotOfBody_.size() ? slotOfBody_[body] : none;
+    return slot == none ? staticSlot() : slot;
+  }
 
  private:
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
@@ -64,6 +69,9 @@ class ContactColoring {
     }
     for (const Contact<S>& c : contacts) {
       detail::requireBodies(c, bodies.size());
+    }
+    for (const std::uint32_t body : bodyOfSlot_) {
+      slotOfBody_[body] = none;
     }
     slotOfBody_.resize(std::max(slotOfBody_.size(), bodies.size()), none);
     bodyOfSlot_.clear();
@@ -86,9 +94,6 @@ class ContactColoring {
       row.slot2 = row.slot2 == none ? staticSlot() : row.slot2;
     }
     movable_.push_back(0);
-    for (const std::uint32_t body : bodyOfSlot_) {
-      slotOfBody_[body] = none;  // ready for the next call
-    }
   }
 
   void choose(std::size_t n) {

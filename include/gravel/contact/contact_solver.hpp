@@ -176,6 +176,11 @@ class ContactSolver {
   }
   const ContactColoring& coloring() const { return coloring_; }
 
+  /// What the last solve() did to the velocity of a body [m s^-1].
+  Vector3<S> changeOf(std::uint32_t body) const {
+    return goesOn_ ? problem_.changeOf(coloring_.slotOf(body)) : Vector3<S>(Vector3<S>::Zero());
+  }
+
   /// Of the solve before the last one, whose contacts may have been others, in the order of their keys.
   const ContactKeys& earlierKeys(std::size_t k) const { return (sameNames_ ? names_ : namesBefore_)[k].keys; }
   std::vector<ContactImpulse<S>> earlierImpulses() const {

@@ -152,36 +152,6 @@ struct ImpactHistory {
   S spent = S(0);
 };
 
-template <Real S>
-struct ImpactSide {
-  Vector3<S> v = Vector3<S>::Zero();
-  Vector3<S> s = Vector3<S>::Zero();  ///< speed of the surface, r w
-  S c = S(0);                         ///< arm / radius
-  S spin = S(0);                      ///< 1/k; 0 if it cannot turn
-  bool movable = false;
-  S mass = S(0);
-  S r = S(0);
-};
-
-/// A side of a blow at the moment t of a step.
-template <Real S, class Scene>
-ImpactSide<S> impactSide(const Scene& scene, std::uint32_t i, const S& arm, const S& t) {
-  const auto& bodies = scene.bodies;
-  ImpactSide<S> side;
-  const S r = bodies.radii()[i];
-  const S k = bodies.inertiaFactors()[i];
-  side.movable = detail::isMovable(bodies, i);
-  side.mass = bodies.masses()[i];
-  if (side.movable) {
-    side.v = scene.course.velocityAt(bodies, i, t, scene.settings.h);
-  }
-  side.s = r * Vector3<S>(bodies.angularVelocities()[i]);
-  side.r = r;
-  side.c = r > S(0) ? S(arm / r) : S(0);
-  side.spin = side.movable && r > S(0) && k > S(0) ? S(S(1) / k) : S(0);
-  return side;
-}
-
 }  // namespace detail
 
 }  // namespace gravel

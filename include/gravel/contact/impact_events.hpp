@@ -59,16 +59,18 @@ class ImpactEvents : private detail::ImpactForecast<S> {
   /// \param decide  asked about each impact of two bodies that is faster than what rests: `decide(impact,
   /// material, v1, v2, v_rel)` with the velocities of the moment gives a `CollisionOutcome`. Two that shall
   /// merge fly on through each other for the rest of the step.
-  template <ContactBodies B, class Candidates, class Course = StraightCourse<S>, class Decide = NoDecision>
+  /// \param support  of bodies that are held: see detail::ImpactScene
+  template <ContactBodies B, class Candidates, class Course = StraightCourse<S>, class Decide = NoDecision,
+            class Support = NoSupport>
   ImpactReport<S> resolve(B& bodies, Candidates& near, const Domain<S>& domain,
                           std::span<const Material<S>> materials, std::span<const HalfSpace<S>> walls,
                           std::span<const ContactName> held, const ImpactSettings<S>& settings,
                           std::optional<std::span<const std::uint32_t>> nearWalls = std::nullopt,
-                          Course&& course = {}, const Decide& decide = {}) {
+                          Course&& course = {}, const Decide& decide = {}, const Support& support = {}) {
     using Path = std::remove_reference_t<Course>;
     clear();
-    const typename Base::template Scene<B, Path> scene{bodies, domain,   materials, walls,
-                                                       held,   settings, course};
+    const detail::ImpactScene<S, B, Path, Support> scene{bodies, domain,   materials, walls,
+                                                         held,   settings, course,    support};
     predictAll(scene, near.pairs(), nearWalls);
     ImpactReport<S> report;
     if (!queue_.empty()) {
@@ -157,7 +159,7 @@ class ImpactEvents : private detail::ImpactForecast<S> {
       distance = bodies.radii()[event.first];
       a_n = -n.dot(scene.acceleration(event.first));
       drift = wall.velocity;
-      one = detail::impactSide<S>(scene, event.first, distance, t);
+      one = Side::of(scene, event.first, distance, t);
       material = mix(surface1, wall.material);
     } else {
       const RelativeFlight<S> flight = flightOf(scene, event.first, event.second, drift);
@@ -173,8 +175,8 @@ class ImpactEvents : private detail::ImpactForecast<S> {
       n = touch->normal;
       distance = touch->distance;
       a_n = n.dot(flight.a);
-      one = detail::impactSide<S>(scene, event.first, touch->arm1, t);
-      two = detail::impactSide<S>(scene, event.second, touch->arm2, t);
+      one = Side::of(scene, event.first, touch->arm1, t);
+      two = Side::of(scene, event.second, touch->arm2, t);
       const std::uint32_t m1 = bodies.materials()[event.first];
       const std::uint32_t m2 = bodies.materials()[event.second];
       material = m1 == m2 ? surface1 : mix(surface1, scene.materials[m2]);
@@ -190,8 +192,8 @@ class ImpactEvents : private detail::ImpactForecast<S> {
     // In a heap, where both already lean on others, what a step's fall brings is rest.
     S threshold = scene.settings.restitutionThreshold;
     if (leans_[event.first] != 0 && (boundary || leans_[event.second] != 0)) {
-      S fall = detail::safeNorm(scene.acceleration(event.first));
-      fall += boundary ? S(0) : detail::safeNorm(scene.acceleration(event.second));
+      S fall = detail::safeNorm(scene.freeAcceleration(event.first));
+      fall += boundary ? S(0) : detail::safeNorm(scene.freeAcceleration(event.second));
       threshold = std::max<S>(threshold, fall * h);
     }
     const S e = speed > threshold ? restitutionAt(material, speed) : S(0);
@@ -263,8 +265,10 @@ class ImpactEvents : private detail::ImpactForecast<S> {
     }
     const S& m = share.effective;
     const Vector3<S> slipAfter = slip + mobility * dv_t;
-    report.restitutionLoss -= m * dv_n * (v_n + target) / S(2);
-    report.frictionLoss -= m * (dv_t.dot(Vector3<S>(slip + slipAfter)) / S(2) + turned);
+    const Vector3<S> supported = two.supported - one.supported;
+    report.restitutionLoss -= m * dv_n * ((v_n + target) / S(2) - n.dot(supported));
+    report.frictionLoss -=
+        m * (dv_t.dot(Vector3<S>(Vector3<S>(slip + slipAfter) / S(2) - supported)) + turned);
     report.driftWork -= m * Vector3<S>(dv_n * n + dv_t).dot(drift);
     impacts_.push_back({event.first,
                         event.second,
@@ -291,7 +295,8 @@ class ImpactEvents : private detail::ImpactForecast<S> {
     const Vector3<S> nothing = Vector3<S>::Zero();
     const Vector3<S> before = scene.bodies.angularVelocities()[i];
     const S moment = S(scene.bodies.inertiaFactors()[i]) * side.mass * side.r * side.r;
-    report.restitutionLoss -= side.mass * Vector3<S>(v - side.v).dot(Vector3<S>(v + side.v)) / S(2);
+    report.restitutionLoss -=
+        side.mass * Vector3<S>(v - side.v).dot(Vector3<S>(Vector3<S>(v + side.v) / S(2) - side.supported));
     report.frictionLoss -= moment * Vector3<S>(w - before).dot(Vector3<S>(w + before)) / S(2);
     scene.course.push(scene.bodies, i, S(1), {Vector3<S>(v - side.v), nothing, nothing}, t);
     scene.bodies.angularVelocities()[i] = w;

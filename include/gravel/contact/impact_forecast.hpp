@@ -4,7 +4,7 @@
 /// Which pairs will touch in a step, and when, kept true while blows change the courses of bodies.
 
 #include <gravel/contact/contact.hpp>
-#include <gravel/contact/impact.hpp>
+#include <gravel/contact/impact_scene.hpp>
 #include <gravel/contact/swept_spheres.hpp>
 #include <gravel/core/parallel.hpp>
 
@@ -24,33 +24,13 @@ class ImpactForecast {
   bool foresees(const B& bodies, std::span<const Pair> pairs, const Domain<S>& domain,
                 std::span<const HalfSpace<S>> walls, const ImpactSettings<S>& settings,
                 const std::optional<std::span<const std::uint32_t>>& nearWalls, const Course& course) {
-    predictAll(Scene<const B, const Course>{bodies, domain, {}, walls, {}, settings, course}, pairs,
-               nearWalls);
+    const NoSupport free;
+    predictAll(ImpactScene<S, const B, const Course>{bodies, domain, {}, walls, {}, settings, course, free},
+               pairs, nearWalls);
     return !queue_.empty();
   }
 
  protected:
-  template <class B, class Course>
-  struct Scene {
-    B& bodies;
-    const Domain<S>& domain;
-    std::span<const Material<S>> materials;
-    std::span<const HalfSpace<S>> walls;
-    std::span<const ContactName> held;
-    const ImpactSettings<S>& settings;
-    Course& course;
-
-    /// Mean velocity of the drift and acceleration; none of what nothing moves.
-    Vector3<S> velocity(std::uint32_t i) const {
-      return detail::isMovable(bodies, i) ? Vector3<S>(course.velocity(bodies, i))
-                                          : Vector3<S>(Vector3<S>::Zero());
-    }
-    Vector3<S> acceleration(std::uint32_t i) const {
-      return detail::isMovable(bodies, i) ? Vector3<S>(course.acceleration(bodies, i))
-                                          : Vector3<S>(Vector3<S>::Zero());
-    }
-  };
-
   using Event = ImpactEvent<S>;
   using History = ImpactHistory<S>;
 
@@ -196,7 +176,7 @@ class ImpactForecast {
       if (isHeld(scene, body, key1, key2)) {
         const S gap = wall.normal.dot(flight.place(from)) - radius;
         if (isDriven(scene, gap, radius, S(-wall.normal.dot(flight.velocity(from))),
-                     detail::safeNorm(flight.a))) {
+                     detail::safeNorm(scene.freeAcceleration(body)))) {
           schedule({from, body, staticPartner, key1, key2, 0, 0, w});
         }
       } else if (const auto t = timeOfImpact<S>(flight, wall.normal, radius, from)) {
@@ -223,7 +203,8 @@ class ImpactForecast {
       const Vector3<S> r = flight.place(from);
       const S distance = detail::safeNorm(r);
       const Vector3<S> n = detail::safeUnit(r);
-      const S fall = detail::safeNorm(scene.acceleration(i)) + detail::safeNorm(scene.acceleration(j));
+      const S fall =
+          detail::safeNorm(scene.freeAcceleration(i)) + detail::safeNorm(scene.freeAcceleration(j));
       if (isDriven(scene, S(distance - reach), reach, S(-n.dot(flight.velocity(from))), fall)) {
         schedule({from, i, j, key1, key2});
       }

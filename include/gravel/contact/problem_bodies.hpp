@@ -42,6 +42,11 @@ class ProblemBodies {
     });
   }
 
+  /// What impulses did to the velocity of a body [m s^-1].
+  Vector3<S> changeOf(std::uint32_t slot) const {
+    return scaled<S>(Vector3<S>(bodies[slot].v - initial[slot].v), -speedExponent_);
+  }
+
   /// Impulses and energies in SI units from those of the scaled problem, and back.
   S impulseOut(const S& j) const { return scaled<S>(j, -speedExponent_ - massExponent_); }
   Vector3<S> impulseOut(const Vector3<S>& j) const { return scaled<S>(j, -speedExponent_ - massExponent_); }

@@ -18,7 +18,8 @@ namespace gravel::detail {
 template <Real S>
 class SweptSpheres {
  public:
-  /// No body gets further from where it starts than |v| h + |a| h^2/8. O(N).
+  /// No body gets further from where it starts than |v| h + |a| h^2/8, and what holds it does not add more
+  /// than 2 |a| to its acceleration. O(N).
   /// \param scene `bodies`, their `course` with its mean velocity and acceleration, and `walls`
   /// \param h [s]
   template <class Scene>
@@ -29,7 +30,7 @@ class SweptSpheres {
       S way(0);
       if (isMovable(scene.bodies, k)) {
         way = h * safeNorm(Vector3<S>(scene.course.velocity(scene.bodies, i))) +
-              h * h * sumAbs(Vector3<S>(scene.course.acceleration(scene.bodies, i)));
+              h * h * sumAbs(Vector3<S>(scene.freeAcceleration(i)));
       }
       spheres_[k] = {scene.bodies.positions()[i], S(scene.bodies.radii()[i]) + way};
     });

@@ -76,6 +76,14 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
   const std::span<const Material<Scalar>> surfaces(materials.entries());
   const std::span<const HalfSpace<Scalar>> walls(walls_);
   const std::span<const ContactName> held = names();
+  // Contacts that bear a body change its velocity by what it falls in half a step; those that stop it, by
+  // more.
+  const auto support = [&](std::uint32_t i) {
+    const Vector3<Scalar> dv = solver_.changeOf(i);
+    const Scalar fall = detail::safeNorm(Vector3<Scalar>(bodies.accelerations()[i])) * h;
+    return dv.squaredNorm() > fall * fall ? Vector3<Scalar>(Vector3<Scalar>::Zero())
+                                          : Vector3<Scalar>(dv * (Scalar(2) / h));
+  };
   ImpactReport<Scalar> blows;
   if (collisionHook) {
     const auto decide = [&](const Impact<Scalar>& impact, const Material<Scalar>& material,
@@ -95,10 +103,10 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
           partner(impact.second, impact.key2, v2), impact.normal, v_rel, material, impact.speed});
     };
     blows = impacts_.resolve(bodies, near, domain, surfaces, walls, held, settings, nearBoundaries(bodies, h),
-                             course, decide);
+                             course, decide, support);
   } else {
     blows = impacts_.resolve(bodies, near, domain, surfaces, walls, held, settings, nearBoundaries(bodies, h),
-                             course);
+                             course, NoDecision{}, support);
   }
   neighbours_.add(impacts_.candidatesAdded(), bodies.ids());
   for (const TurnChange<Scalar>& turn : impacts_.turns()) {

@@ -1,0 +1,95 @@
+#pragma once
+
+/// \file
+/// What impacts inside a step are found and dealt among: bodies on their courses, walls, and what is held.
+
+#include <gravel/contact/contact.hpp>
+#include <gravel/contact/contact_bodies.hpp>
+#include <gravel/contact/impact.hpp>
+#include <gravel/spatial/domain.hpp>
+
+#include <span>
+
+namespace gravel {
+
+/// No body leans on another.
+struct NoSupport {};
+
+namespace detail {
+
+/// \tparam Support  `support(i)` [m s^-2]: what the contacts that hold body i add to its acceleration. What
+/// rests on something would else be seen to rise by g h/2 at the start of a step and to sink at its end: a
+/// ball on it would be thrown up for ever.
+template <class S, class B, class Course, class Support = NoSupport>
+struct ImpactScene {
+  B& bodies;
+  const Domain<S>& domain;
+  std::span<const Material<S>> materials;
+  std::span<const HalfSpace<S>> walls;
+  std::span<const ContactName> held;
+  const ImpactSettings<S>& settings;
+  Course& course;
+  const Support& support;
+
+  /// Mean velocity of the drift, and accelerations; none of what nothing moves.
+  Vector3<S> velocity(std::uint32_t i) const {
+    return isMovable(bodies, i) ? Vector3<S>(course.velocity(bodies, i)) : Vector3<S>(Vector3<S>::Zero());
+  }
+  Vector3<S> acceleration(std::uint32_t i) const {
+    Vector3<S> a = freeAcceleration(i);
+    if constexpr (!std::is_same_v<Support, NoSupport>) {
+      a += isMovable(bodies, i) ? Vector3<S>(support(i)) : Vector3<S>(Vector3<S>::Zero());
+    }
+    return a;
+  }
+  /// By which a body falls that nothing holds.
+  Vector3<S> freeAcceleration(std::uint32_t i) const {
+    return isMovable(bodies, i) ? Vector3<S>(course.acceleration(bodies, i)) : Vector3<S>(Vector3<S>::Zero());
+  }
+  /// What support makes of the velocity of a movable body at t [s] since the start of the step.
+  Vector3<S> velocityBySupport(std::uint32_t i, const S& t) const {
+    if constexpr (!std::is_same_v<Support, NoSupport>) {
+      return Vector3<S>(support(i)) * (t - settings.h / S(2));
+    } else {
+      return Vector3<S>::Zero();
+    }
+  }
+};
+
+/// A side of a blow at the moment t of a step.
+template <Real S>
+struct ImpactSide {
+  Vector3<S> v = Vector3<S>::Zero();
+  /// The part of v that is due to support. Solves of contacts book the energy of what they do to velocities
+  /// at the ends of a step, where there is none of it: a blow takes its energy from v without this part.
+  Vector3<S> supported = Vector3<S>::Zero();
+  Vector3<S> s = Vector3<S>::Zero();  ///< speed of the surface, r w
+  S c = S(0);                         ///< arm / radius
+  S spin = S(0);                      ///< 1/k; 0 if it cannot turn
+  bool movable = false;
+  S mass = S(0);
+  S r = S(0);
+
+  template <class Scene>
+  static ImpactSide of(const Scene& scene, std::uint32_t i, const S& arm, const S& t) {
+    const auto& bodies = scene.bodies;
+    ImpactSide side;
+    const S r = bodies.radii()[i];
+    const S k = bodies.inertiaFactors()[i];
+    side.movable = isMovable(bodies, i);
+    side.mass = bodies.masses()[i];
+    if (side.movable) {
+      side.supported = scene.velocityBySupport(i, t);
+      side.v = Vector3<S>(scene.course.velocityAt(bodies, i, t, scene.settings.h)) + side.supported;
+    }
+    side.s = r * Vector3<S>(bodies.angularVelocities()[i]);
+    side.r = r;
+    side.c = r > S(0) ? S(arm / r) : S(0);
+    side.spin = side.movable && r > S(0) && k > S(0) ? S(S(1) / k) : S(0);
+    return side;
+  }
+};
+
+}  // namespace detail
+
+}  // namespace gravel
