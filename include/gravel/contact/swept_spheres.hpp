@@ -18,8 +18,8 @@ namespace gravel::detail {
 template <Real S>
 class SweptSpheres {
  public:
-  /// No body gets further from where it starts than |v| h + |a| h^2/8, and what holds it does not add more
-  /// than 2 |a| to its acceleration. O(N).
+  /// No body gets further from where it starts than |v| h + |a| h^2/8, with the acceleration a of its course
+  /// and at most twice that of forces more, by what holds it. O(N).
   /// \param scene `bodies`, their `course` with its mean velocity and acceleration, and `walls`
   /// \param h [s]
   template <class Scene>
@@ -30,7 +30,9 @@ class SweptSpheres {
       S way(0);
       if (isMovable(scene.bodies, k)) {
         way = h * safeNorm(Vector3<S>(scene.course.velocity(scene.bodies, i))) +
-              h * h * sumAbs(Vector3<S>(scene.freeAcceleration(i)));
+              h * h / S(2) *
+                  (sumAbs(Vector3<S>(scene.course.acceleration(scene.bodies, i))) +
+                   sumAbs(Vector3<S>(scene.bodies.accelerations()[i])));
       }
       spheres_[k] = {scene.bodies.positions()[i], S(scene.bodies.radii()[i]) + way};
     });

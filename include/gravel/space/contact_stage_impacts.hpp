@@ -81,8 +81,8 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
   const auto support = [&](std::uint32_t i) {
     const Vector3<Scalar> dv = solver_.changeOf(i);
     const Scalar fall = detail::safeNorm(Vector3<Scalar>(bodies.accelerations()[i])) * h;
-    return dv.squaredNorm() > fall * fall ? Vector3<Scalar>(Vector3<Scalar>::Zero())
-                                          : Vector3<Scalar>(dv * (Scalar(2) / h));
+    return detail::safeNorm(dv) > fall ? Vector3<Scalar>(Vector3<Scalar>::Zero())
+                                       : Vector3<Scalar>(dv * (Scalar(2) / h));
   };
   ImpactReport<Scalar> blows;
   if (collisionHook) {
