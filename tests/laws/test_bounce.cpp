@@ -1,4 +1,4 @@
-#include "laws/laws.hpp"
+#include "laws/rebound.hpp"
 #include "support/catch.hpp"
 
 // A ball dropped from height h onto a plane: heights h e^(2n), and rest after sqrt(2h/g) (1 + e)/(1 - e).
@@ -162,19 +162,9 @@ struct Rebound {
 };
 
 Rebound rebound(double dt, double start) {
-  SimulationConfig<double> config = plain(dt);
-  config.G = 1;
-  config.coeffRestitution = 0.5;
-  Space<double> space(config);
-  space.addBody(ball({-start / 2, 0, 0}, {0, 0, 0}, 0.5));
-  space.addBody(ball({start / 2, 0, 0}, {0, 0, 0}, 0.5));
-  // mu = 2: v^2 = 4 (1/r - 1/r0); half the period of a radial orbit of height r is pi sqrt(r^3/16).
-  const auto fall = [](double from) {
-    const double x = 1 / from;
-    return std::sqrt(from * from * from / 4) * (std::acos(std::sqrt(x)) + std::sqrt(x * (1 - x)));
-  };
-  const double height = 1 / (1 - 0.25 * (1 - 1 / start));
-  const double second = fall(start) + 2 * fall(height);
+  Space<double> space = rebounding(plain(dt), start);
+  const double height = reboundHeight(start);
+  const double second = reboundTime(start);
   Rebound error;
   int hits = 0;
   double top = 0;

@@ -1,4 +1,4 @@
-#include "laws/laws.hpp"
+#include "laws/rebound.hpp"
 #include "scenes/scenes.hpp"
 #include "support/catch.hpp"
 #include "support/temporary_file.hpp"
@@ -24,39 +24,6 @@ SimulationConfig<double> by(IntegratorKind kind, double dt) {
 
 std::size_t evaluationsOf(IntegratorKind kind) {
   return static_cast<std::size_t>(traitsOf(kind).forceEvaluations);
-}
-
-/// Two spheres that fall on each other from `start`, e = 1/2: relative error of the time of the second impact
-/// (test_bounce.cpp).
-double reboundError(IntegratorKind kind, double dt, double start) {
-  SimulationConfig<double> config = by(kind, dt);
-  config.G = 1;
-  Space<double> space(config);
-  space.addBody(ball({-start / 2, 0, 0}, {0, 0, 0}, 0.5));
-  space.addBody(ball({start / 2, 0, 0}, {0, 0, 0}, 0.5));
-  const auto fall = [](double from) {
-    const double x = 1 / from;
-    return std::sqrt(from * from * from / 4) * (std::acos(std::sqrt(x)) + std::sqrt(x * (1 - x)));
-  };
-  const double second = fall(start) + 2 * fall(1 / (1 - 0.25 * (1 - 1 / start)));
-  int hits = 0;
-  for (std::size_t i = 0; space.time() < 2 * second; ++i) {
-    space.computeDynamics(i);
-    for (const Impact<double>& impact : space.impacts()) {
-      if (++hits == 2) {
-        return std::abs(space.time() - space.getPreviousTimeStep() + impact.time - second) / second;
-      }
-    }
-  }
-  return 1;
-}
-
-double meanReboundError(IntegratorKind kind, double dt) {
-  double sum = 0;
-  for (int k = 0; k < 16; ++k) {
-    sum += reboundError(kind, dt, 2.0 + 0.0074 * k) / 16;
-  }
-  return sum;
 }
 
 Space<double> heap(IntegratorKind kind) {
@@ -135,13 +102,13 @@ TEST_CASE("By every method a ball bounces in a uniform field at its exact times,
 TEST_CASE("By every method a rebound under mutual gravity is of the second order of the step") {
   for (const IntegratorKind kind :
        {IntegratorKind::Yoshida4, IntegratorKind::BlanesMoan4, IntegratorKind::ForceGradient4}) {
-    const double coarse = meanReboundError(kind, 1.6e-2);
-    const double fine = meanReboundError(kind, 2e-3);
+    const double coarse = meanReboundError(by(kind, 1.6e-2));
+    const double fine = meanReboundError(by(kind, 2e-3));
     CAPTURE(traitsOf(kind).name, coarse, fine);
     CHECK_THAT(std::log2(coarse / fine) / 3, WithinAbs(2.0, 0.25));
     // The flight is the method's, the blow that of a step of velocity Verlet as long as a part.
-    CHECK(fine < 1.5 * meanReboundError(IntegratorKind::VelocityVerlet,
-                                        2e-3 / static_cast<double>(evaluationsOf(kind))));
+    const double part = 2e-3 / static_cast<double>(evaluationsOf(kind));
+    CHECK(fine < 1.5 * meanReboundError(by(IntegratorKind::VelocityVerlet, part)));
   }
 }
 

@@ -1,4 +1,4 @@
-#include "laws/laws.hpp"
+#include "laws/rebound.hpp"
 #include "scenes/scenes.hpp"
 #include "support/catch.hpp"
 #include "support/temporary_file.hpp"
@@ -74,38 +74,6 @@ TEST_CASE("Without contacts a step in parts is velocity Verlet, reversible, with
 
 namespace {
 
-/// Relative error of the time of the second impact of two spheres that fall on each other from `start`, e =
-/// 1/2 (test_bounce.cpp).
-double reboundError(double dt, double start, std::size_t parts) {
-  SimulationConfig<double> config = inParts(dt, parts);
-  config.G = 1;
-  Space<double> space(config);
-  space.addBody(ball({-start / 2, 0, 0}, {0, 0, 0}, 0.5));
-  space.addBody(ball({start / 2, 0, 0}, {0, 0, 0}, 0.5));
-  const auto fall = [](double from) {
-    const double x = 1 / from;
-    return std::sqrt(from * from * from / 4) * (std::acos(std::sqrt(x)) + std::sqrt(x * (1 - x)));
-  };
-  const double second = fall(start) + 2 * fall(1 / (1 - 0.25 * (1 - 1 / start)));
-  int hits = 0;
-  for (std::size_t i = 0;; ++i) {
-    space.computeDynamics(i);
-    for (const Impact<double>& impact : space.impacts()) {
-      if (++hits == 2) {
-        return std::abs(space.time() - space.getPreviousTimeStep() + impact.time - second) / second;
-      }
-    }
-  }
-}
-
-double meanReboundError(double dt, std::size_t parts) {
-  double sum = 0;
-  for (int k = 0; k < 16; ++k) {
-    sum += reboundError(dt, 2.0 + 0.0074 * k, parts) / 16;
-  }
-  return sum;
-}
-
 /// A ball on a plane under the pull of a point at depth `d` below its centre rolls as
 /// x'' = -(5/7) x/(x^2 + d^2)^(3/2). \return the error of x at t = 4 from x = 1 at rest, and of the energy
 std::array<double, 2> rollingError(double dt, std::size_t parts) {
@@ -143,8 +111,8 @@ std::array<double, 2> rollingError(double dt, std::size_t parts) {
 // reported with times since the start of their part.
 TEST_CASE("Impacts and rolling under gravity are of the second order of the step, whatever its parts") {
   for (const std::size_t parts : {1U, 2U, 4U}) {
-    const double coarse = meanReboundError(8e-3, parts);
-    const double fine = meanReboundError(2e-3, parts);
+    const double coarse = meanReboundError(inParts(8e-3, parts));
+    const double fine = meanReboundError(inParts(2e-3, parts));
     CAPTURE(parts, coarse, fine);
     CHECK_THAT(std::log2(coarse / fine) / 2, WithinAbs(2.0, 0.25));
     const auto rough = rollingError(0.05, parts);
