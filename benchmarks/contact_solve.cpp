@@ -36,7 +36,7 @@ struct Scene {
   std::vector<Pair> candidates;
   S weight = 0;
 
-  std::vector<Contact<S>> contacts(const Material<S>& material) const {
+  ContactList<S> contacts(const Material<S>& material) const {
     const std::vector<Material<S>> materials{material};
     std::vector<HalfSpace<S>> same = walls;
     for (HalfSpace<S>& wall : same) {
@@ -45,7 +45,7 @@ struct Scene {
         wall.material.staticFriction = wall.material.kineticFriction = 0;
       }
     }
-    std::vector<Contact<S>> found;
+    ContactList<S> found;
     NarrowPhaseSettings<S> settings;
     settings.margin = margin;
     NarrowPhase<S>().find(candidates, bodies, Domain<S>::open(), materials, same, settings, found);
@@ -82,7 +82,7 @@ const Scene& packing() {
     settings.factor = 1.0;
     settings.maxIterations = 20;
     const std::vector<Material<S>> materials(1);
-    std::vector<Contact<S>> touching;
+    ContactList<S> touching;
     for (int round = 0; round < 400; ++round) {
       broad.findPairs(s.bodies.positions(), s.bodies.radii(), s.bodies.ids(), 0.05, Domain<S>::open(), 0.0,
                       s.candidates);
@@ -110,7 +110,7 @@ void narrowPhase(benchmark::State& state) {
   NarrowPhaseSettings<S> settings;
   settings.margin = margin;
   NarrowPhase<S> narrow;
-  std::vector<Contact<S>> found;
+  ContactList<S> found;
   const Stopwatch watch;
   for (auto _ : state) {
     narrow.find(scene.candidates, scene.bodies, Domain<S>::open(), materials, {}, settings, found);
@@ -185,7 +185,7 @@ void lonePairs(benchmark::State& state) {
     pairs.push_back({2 * i, 2 * i + 1});
   }
   const std::vector<Material<S>> materials(1);
-  std::vector<Contact<S>> contacts;
+  ContactList<S> contacts;
   NarrowPhase<S>().find(pairs, start, Domain<S>::open(), materials, {}, {}, contacts);
   Bodies<S, SoA> bodies = start;
   ContactSolver<S> solver;

@@ -68,8 +68,8 @@ std::vector<Pair> allPairs(const B& bodies) {
 }
 
 template <class S, class B>
-std::vector<Contact<S>> contactsOf(const B& bodies, const Material<S>& material,
-                                   std::vector<HalfSpace<S>> walls = {}, S margin = S(0)) {
+ContactList<S> contactsOf(const B& bodies, const Material<S>& material, std::vector<HalfSpace<S>> walls = {},
+                          S margin = S(0)) {
   for (std::size_t b = 0; b < walls.size(); ++b) {
     walls[b].material = material;
     walls[b].number = b;
@@ -77,7 +77,7 @@ std::vector<Contact<S>> contactsOf(const B& bodies, const Material<S>& material,
   const std::vector<Material<S>> materials{material};
   NarrowPhaseSettings<S> settings;
   settings.margin = margin;
-  std::vector<Contact<S>> contacts;
+  ContactList<S> contacts;
   NarrowPhase<S>().find(allPairs(bodies), bodies, Domain<S>::open(), materials, walls, settings, contacts);
   return contacts;
 }

@@ -19,8 +19,8 @@ void walk(S skin, std::size_t& searches, std::size_t& contacts) {
   settings.margin = S(0.01);
   NarrowPhase<S> narrow;
   BoundaryList<S> list;
-  std::vector<Contact<S>> every;
-  std::vector<Contact<S>> near;
+  ContactList<S> every;
+  ContactList<S> near;
   const S stride = S(0.02);
   S moved = S(0);
   for (int step = 0; step < 300; ++step) {

@@ -189,7 +189,7 @@ TEST_CASE("all contacts of a fixed body with single grains are one group") {
   }
   std::vector<Contact<double>> contacts;
   for (std::uint32_t i = 1; i <= 200; ++i) {
-    contacts.push_back({0, i, 0, i, {1, 0, 0}, -1.0, 1.0, 0.0, {}, {0, 0, 0}});
+    contacts.push_back({0, i, 0, i, {1, 0, 0}, -1.0, 1.0, 0.0});
   }
   ContactColoring coloring;
   coloring.build(std::span<const Contact<double>>(contacts), bodies);

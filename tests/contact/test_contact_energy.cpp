@@ -14,7 +14,9 @@ Wide gain(std::uint64_t seed, Change change) {
   Bodies<double, SoA> bodies = randomCloud<double>(60, 4.2, seed);
   auto contacts = contactsOf<double>(bodies, Material<double>{});
   for (std::size_t k = 0; k < contacts.size(); ++k) {
-    change(contacts[k].material, k);
+    Material<double> material;
+    change(material, k);
+    contacts.setSurface(contacts[k], {material});
   }
   const Totals before(bodies);
   ContactSolver<double> solver;

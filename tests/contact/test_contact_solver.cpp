@@ -16,11 +16,11 @@ namespace {
 
 /// Contacts that a random material was drawn for, each its own.
 template <class S, class B>
-std::vector<Contact<S>> mixedContacts(const B& bodies, const CounterRandom& random) {
-  std::vector<Contact<S>> contacts = contactsOf<S>(bodies, Material<S>{});
+ContactList<S> mixedContacts(const B& bodies, const CounterRandom& random) {
+  ContactList<S> contacts = contactsOf<S>(bodies, Material<S>{});
   std::uint64_t counter = 0;
   for (Contact<S>& c : contacts) {
-    c.material = randomMaterial<S>(random, counter);
+    contacts.setSurface(c, {randomMaterial<S>(random, counter)});
   }
   return contacts;
 }
@@ -142,7 +142,8 @@ TEMPLATE_TEST_CASE("a dense crowd: momentum, angular momentum, energy, ledger an
     for (std::size_t k = 0; k < contacts.size(); ++k) {
       const ContactImpulse<S>& j = solver.impulses()[k];
       CHECK(j.normal >= S(0));
-      CHECK(j.tangential.norm() <= contacts[k].material.staticFriction * j.normal * (S(1) + S(16) * eps<S>));
+      CHECK(j.tangential.norm() <=
+            contacts.material(contacts[k]).staticFriction * j.normal * (S(1) + S(16) * eps<S>));
       CHECK(std::abs(j.tangential.dot(contacts[k].normal)) <=
             S(4 * report.iterations) * eps<S> * largest);  // a rounding or two a sweep
     }
@@ -211,7 +212,7 @@ TEST_CASE("same bits for 1, 2, 3 and 8 threads, and whatever the indices of the 
   });
   const std::vector<Material<double>> materials{{0.5, 0.5, 0.4, 0.2}};
   const auto run = [&](Bodies<double, SoA>& bodies, const std::vector<Pair>& candidates) {
-    std::vector<Contact<double>> contacts;
+    ContactList<double> contacts;
     NarrowPhase<double>().find(candidates, bodies, Domain<double>::open(), materials, floorAtZero<double>(),
                                {}, contacts);
 
@@ -660,7 +661,7 @@ TEST_CASE("a solver that knows ordinary speeds and masses takes tiny ones as a n
   settings.warmStart = false;
   ContactSolver<double> used;
   used.setSettings(settings);
-  std::vector<Contact<double>> contacts;
+  ContactList<double> contacts;
   for (const auto& [speed, mass] : {std::pair(1.0, 1.0), std::pair(0x1p-1000, 1.0), std::pair(1.0, 0x1p-997),
                                     std::pair(1.0, 1.0), std::pair(0x1p900, 1.0), std::pair(1.0, 1.0)}) {
     Bodies<double, SoA> bodies;
@@ -707,7 +708,7 @@ TEST_CASE("a solver that knows far higher speeds begins anew where they have fal
         return bodies;
       };
       Bodies<double, SoA> fast = three(1.0);
-      std::vector<Contact<double>> contacts = contactsOf(fast, material);
+      ContactList<double> contacts = contactsOf(fast, material);
       REQUIRE(contacts.size() == 2);
       ContactSolver<double> used;
       used.solve(contacts, fast, 0.01);
@@ -769,7 +770,7 @@ TEST_CASE("a moving partner: friction carries along, and the drift's work closes
   auto contacts = contactsOf(bodies, Material<double>{0.3, 0.5, 0.4, 0.0}, floorAtZero<double>());
   for (Contact<double>& c : contacts) {
     if (c.second == staticPartner) {
-      c.drift = {0.02, 0, 0.01};  // the floor moves
+      contacts.setSurface(c, {contacts.material(c), {0.02, 0, 0.01}});  // the floor moves
     }
   }
   const double before = static_cast<double>(Totals(bodies).energy);
@@ -790,11 +791,11 @@ TEST_CASE(
   Material<double> material{0.3, 0.5, 0.4, 0.0};
   const bool turns = GENERATE(false, true);
   material.rollingFriction = material.spinningFriction = turns ? 0.05 : 0.0;
-  std::vector<Contact<double>> all = contactsOf(bodies, material);
-  std::vector<Contact<double>> fewer;
+  ContactList<double> all = contactsOf(bodies, material);
+  ContactList<double> fewer;
   for (std::size_t k = 0; k < all.size(); ++k) {
     if (k % 3 != 0) {
-      fewer.push_back(all[k]);
+      fewer.push_back(all[k], all.surface(all[k]));
     }
   }
   REQUIRE(fewer.size() > 100);
@@ -804,7 +805,7 @@ TEST_CASE(
   };
   ContactSolver<double> solver;
   std::vector<ContactImpulse<double>> before;
-  for (const std::vector<Contact<double>>* contacts : {&all, &all, &fewer, &all, &all}) {
+  for (const ContactList<double>* contacts : {&all, &all, &fewer, &all, &all}) {
     std::vector<Vector3<double>> velocities;
     std::vector<Vector3<double>> spins;
     for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -874,7 +875,7 @@ TEST_CASE("all fixed, none, and one: no work and no crash; a body with a hundred
     bodies.add(ball);
   }
   auto contacts = contactsOf(bodies, Material<double>{0, 0, 0, 0});
-  std::erase_if(contacts, [](const Contact<double>& c) { return c.key1 != 0; });
+  std::erase_if(contacts.contacts, [](const Contact<double>& c) { return c.key1 != 0; });
   REQUIRE(contacts.size() == 100);
   const Totals before(bodies);
   ContactSettings<double> settings;
@@ -901,6 +902,10 @@ TEST_CASE("contacts of bodies that do not exist and settings out of range are re
                     ContainsSubstring("0, 7") && ContainsSubstring("below 2"));
   contacts[0].second = contacts[0].first;
   CHECK_THROWS_AS(solver.solve(contacts, bodies, 1.0), std::invalid_argument);
+  contacts[0].second = 1;
+  contacts[0].surface = 12;
+  CHECK_THROWS_WITH(solver.solve(contacts, bodies, 1.0), ContainsSubstring("surface of a contact is 12") &&
+                                                             ContainsSubstring("number of surfaces"));
   const auto with = [](auto change) {
     ContactSettings<double> s;
     change(s);

@@ -107,7 +107,7 @@ TEMPLATE_TEST_CASE(
     const NormalImpulse<S> normal = applyNormalImpulse(*ctx, m.restitution);
     const Vector3<S> friction = applyFrictionImpulse(*ctx, normal.magnitude, m.staticFriction,
                                                      m.kineticFriction, m.tangentialRestitution);
-    const std::vector<Contact<S>> contacts = contactsOf<S>(bySolver, m);
+    const ContactList<S> contacts = contactsOf<S>(bySolver, m);
     REQUIRE(contacts.size() == 1);
     ContactSolver<S> solver;
     const ContactReport<S> report = solver.solve(contacts, bySolver, S(0.01));
@@ -162,7 +162,7 @@ TEMPLATE_TEST_CASE("a sphere and a half-space: the closed form with an infinite 
     const ClosedForm expected =
         closedForm(sideOf(bodies[0], a.radius), wall, -up.template cast<Wide>(), m.restitution,
                    m.staticFriction, m.kineticFriction, m.tangentialRestitution);
-    const std::vector<Contact<S>> contacts = contactsOf<S>(bodies, m, {{up, S(0), {}}});
+    const ContactList<S> contacts = contactsOf<S>(bodies, m, {{up, S(0), {}}});
     REQUIRE(contacts.size() == 1);
     CHECK(contacts[0].key2 == boundaryKey(0));
     ContactSolver<S>().solve(contacts, bodies, S(0.01));

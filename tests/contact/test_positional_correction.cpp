@@ -8,12 +8,11 @@ using namespace gravel::test;
 namespace {
 
 template <class S, class B>
-CorrectionReport<S> correct(B& bodies, const std::vector<Contact<S>>& contacts,
-                            const CorrectionSettings<S>& settings, PositionalCorrection<S>& correction) {
+CorrectionReport<S> correct(B& bodies, const ContactList<S>& contacts, const CorrectionSettings<S>& settings,
+                            PositionalCorrection<S>& correction) {
   ContactColoring coloring;
   coloring.build(std::span<const Contact<S>>(contacts), bodies);
-  return correction.apply(contacts, coloring, bodies, settings,
-                          ContactFacts<S>::of(std::span<const Contact<S>>(contacts), bodies));
+  return correction.apply(contacts, coloring, bodies, settings, ContactFacts<S>::of(contacts, bodies));
 }
 
 template <class S>

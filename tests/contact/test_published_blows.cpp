@@ -21,7 +21,7 @@ Body<double> bounce(const Vector3<double>& v, const Vector3<double>& w, double r
   ball.velocity = v;
   ball.angularVelocity = w;
   bodies.add(ball);
-  const std::vector<Contact<double>> contacts = contactsOf(bodies, material, floorAtZero<double>());
+  const ContactList<double> contacts = contactsOf(bodies, material, floorAtZero<double>());
   ContactSolver<double>().solve(contacts, bodies, 1e-6);
   return bodies[0].load();
 }

@@ -255,6 +255,6 @@ TEST_CASE("A static coefficient below the kinetic one counts as equal to it") {
   space.addBody(body);
   space.computeDynamics(0);
   REQUIRE(space.contactCount() == 1);
-  CHECK(space.contacts()[0].material.staticFriction == 0.5);
-  CHECK(space.contacts()[0].material.kineticFriction == 0.5);
+  CHECK(space.contacts().material(space.contacts()[0]).staticFriction == 0.5);
+  CHECK(space.contacts().material(space.contacts()[0]).kineticFriction == 0.5);
 }

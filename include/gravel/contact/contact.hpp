@@ -1,7 +1,7 @@
 #pragma once
 
 /// \file
-/// A contact: where two bodies touch, and what their surfaces are.
+/// A contact: where two bodies touch.
 
 #include <gravel/contact/impulses.hpp>
 #include <gravel/contact/material.hpp>
@@ -43,10 +43,7 @@ struct Contact {
   Scalar gap;                 ///< [m] between the surfaces, < 0 is overlap
   Scalar arm1;                ///< [m] centre of the first to the contact along the normal
   Scalar arm2;                ///< [m] contact to the centre of the second
-  Material<Scalar> material;  ///< of the pair, mixed
-  /// [m s^-1] to be added to the velocity of the second: of its image in a sheared domain, of a moving
-  /// boundary.
-  Vector3<Scalar> drift = Vector3<Scalar>::Zero();
+  std::uint32_t surface = 0;  ///< number of its surface in the list (contact/contact_list.hpp)
 
   /// True if a comes before b in lists.
   friend bool keysBefore(const Contact& a, const Contact& b) {
@@ -91,29 +88,6 @@ inline auto placeOf(std::span<const ContactName> names, const ContactKeys& keys,
   const std::span<const ContactName> near = names.subspan(from, std::min(step, names.size() - from));
   return names.begin() + static_cast<std::ptrdiff_t>(from) + (placeOf(near, keys) - near.begin());
 }
-
-/// What occurs among the contacts of a step.
-struct ContactKinds {
-  bool rub = false;     ///< friction
-  bool turn = false;    ///< resistance to rolling or spinning
-  bool spring = false;  ///< tangential restitution
-  bool drift = false;   ///< a second side that moves on by itself
-
-  template <Real S>
-  void include(const Contact<S>& c) {
-    rub = rub || c.material.staticFriction > S(0);
-    turn = turn || c.material.rollingFriction > S(0) || c.material.spinningFriction > S(0);
-    spring = spring || c.material.tangentialRestitution > S(0);
-    drift = drift || !(c.drift == Vector3<S>::Zero());
-  }
-  ContactKinds& operator+=(const ContactKinds& other) {
-    rub = rub || other.rub;
-    turn = turn || other.turn;
-    spring = spring || other.spring;
-    drift = drift || other.drift;
-    return *this;
-  }
-};
 
 /// A boundary: n.x >= offset is free.
 template <Real Scalar>

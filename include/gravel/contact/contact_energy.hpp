@@ -27,9 +27,8 @@ class ContactEnergy {
  public:
   /// Guards the energy of `problem`, fills in the losses of the report, and takes down the impulses in the
   /// order of rows. O(contacts). \param others the rows are not those of the last call
-  void settle(ContactProblem<S>& problem, const ContactColoring& colouring,
-              std::span<const Contact<S>> contacts, bool others, ContactReport<S>& report,
-              detail::ImpulseList<S>& impulses) {
+  void settle(ContactProblem<S>& problem, const ContactColoring& colouring, const ContactView<S>& contacts,
+              bool others, ContactReport<S>& report, detail::ImpulseList<S>& impulses) {
     terms_.resize(problem.rows.size());
     known_ = known_ && !others;
     impulses.resize(problem.rows.size(), !problem.turning.empty());
@@ -96,13 +95,14 @@ class ContactEnergy {
     });
   }
 
-  static Vector3<S> driftOf(const ContactProblem<S>& problem, std::span<const Contact<S>> contacts,
+  static Vector3<S> driftOf(const ContactProblem<S>& problem, const ContactView<S>& contacts,
                             const Row& row) {
-    return problem.drifting ? problem.speedIn(contacts[row.contact].drift) : Vector3<S>(Vector3<S>::Zero());
+    return problem.drifting ? problem.speedIn(contacts.drift(contacts[row.contact]))
+                            : Vector3<S>(Vector3<S>::Zero());
   }
 
   /// \param kept from this row on impulses are those of the last problem
-  Sums takeDown(const ContactProblem<S>& problem, std::span<const Contact<S>> contacts, std::size_t kept,
+  Sums takeDown(const ContactProblem<S>& problem, const ContactView<S>& contacts, std::size_t kept,
                 detail::ImpulseList<S>& impulses) {
     findMeans(problem);
     return orderedSum(problem.rows.size(), chunk, Sums(Sums::Zero()),
@@ -148,8 +148,7 @@ class ContactEnergy {
 
   /// Islands: movable bodies joined by contacts. dT of an island is beta a + beta^2 b under a common factor
   /// beta, a = sum J.u^- and b = sum J.(u^+ - u^-)/2 >= 0: zero at beta = -a/b.
-  bool guard(ContactProblem<S>& problem, const ContactColoring& colouring,
-             std::span<const Contact<S>> contacts) {
+  bool guard(ContactProblem<S>& problem, const ContactColoring& colouring, const ContactView<S>& contacts) {
     if (!known_) {
       findIslands(colouring);
       known_ = true;

@@ -3,8 +3,8 @@
 /// \file
 /// What has to be known of all contacts of a step together, before they are moved apart and solved.
 
-#include <gravel/contact/contact.hpp>
 #include <gravel/contact/contact_bodies.hpp>
+#include <gravel/contact/contact_list.hpp>
 #include <gravel/core/check.hpp>
 #include <gravel/core/parallel.hpp>
 
@@ -14,6 +14,29 @@
 
 namespace gravel {
 
+/// What occurs among the contacts of a step.
+struct ContactKinds {
+  bool rub = false;     ///< friction
+  bool turn = false;    ///< resistance to rolling or spinning
+  bool spring = false;  ///< tangential restitution
+  bool drift = false;   ///< a second side that moves on by itself
+
+  template <Real S>
+  void include(const ContactSurface<S>& surface) {
+    rub = rub || surface.material.staticFriction > S(0);
+    turn = turn || surface.material.rollingFriction > S(0) || surface.material.spinningFriction > S(0);
+    spring = spring || surface.material.tangentialRestitution > S(0);
+    drift = drift || !(surface.drift == Vector3<S>::Zero());
+  }
+  ContactKinds& operator+=(const ContactKinds& other) {
+    rub = rub || other.rub;
+    turn = turn || other.turn;
+    spring = spring || other.spring;
+    drift = drift || other.drift;
+    return *this;
+  }
+};
+
 /// Found by who makes the contacts, while each is at hand, or by of().
 template <Real S>
 struct ContactFacts {
@@ -22,9 +45,8 @@ struct ContactFacts {
   S radius = Eigen::NumTraits<S>::highest();  ///< [m] the smallest
   std::size_t others = 0;                     ///< that are not those of before, in their places
 
-  /// \param r the smaller of its radii  \param before its name is the one of before
+  /// All but its kind. \param r the smaller of its radii  \param before its name is the one of before
   void include(const Contact<S>& c, const S& r, bool before) {
-    kinds.include(c);
     overlap = std::max<S>(overlap, S(-c.gap));
     radius = std::min<S>(radius, r);
     others += before ? 0 : 1;
@@ -38,9 +60,10 @@ struct ContactFacts {
   }
 
   /// \param before names of contacts, in the same order
-  /// \throws std::invalid_argument for a contact of a body that is not there, or of a body with itself
+  /// \throws std::invalid_argument for a contact of a body that is not there, or of a body with itself, or
+  ///         without a surface
   template <ContactBodies B>
-  static ContactFacts of(std::span<const Contact<S>> contacts, const B& bodies,
+  static ContactFacts of(const ContactView<S>& contacts, const B& bodies,
                          std::span<const ContactName> before = {});
 };
 
@@ -53,6 +76,15 @@ void requireBodies(const Contact<S>& c, std::size_t count) {
   if (!known || c.first == c.second) {
     refuse("body of a contact", std::to_string(c.first) + ", " + std::to_string(c.second),
            "two bodies, below " + std::to_string(count) + ", or a boundary");
+  }
+}
+
+/// \throws std::invalid_argument for a contact without a surface
+template <Real S>
+void requireSurface(const Contact<S>& c, std::size_t count) {
+  if (c.surface >= count) {
+    refuse("surface of a contact", std::to_string(c.surface),
+           "below the number of surfaces, " + std::to_string(count));
   }
 }
 
@@ -79,13 +111,15 @@ bool isNamed(std::span<const ContactName> names, std::size_t k, const Contact<S>
 
 template <Real S>
 template <ContactBodies B>
-ContactFacts<S> ContactFacts<S>::of(std::span<const Contact<S>> contacts, const B& bodies,
+ContactFacts<S> ContactFacts<S>::of(const ContactView<S>& contacts, const B& bodies,
                                     std::span<const ContactName> before) {
   return orderedSum(contacts.size(), 512, ContactFacts{}, [&](std::size_t begin, std::size_t end) {
     ContactFacts part;
     for (std::size_t k = begin; k < end; ++k) {
       const Contact<S>& c = contacts[k];
       detail::requireBodies(c, bodies.size());
+      detail::requireSurface(c, contacts.surfaces.size());
+      part.kinds.include(contacts.surface(c));
       part.include(c, detail::smallerRadius(c, bodies), detail::isNamed(before, k, c));
     }
     return part;

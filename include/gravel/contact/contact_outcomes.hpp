@@ -24,8 +24,8 @@ struct ContactOutcomes {
 /// `threshold` + 2 |a_rel.n| h, and gives them the velocities of its outcome. O(contacts), one thread.
 /// \param decided pairs of ids about which it was asked in this step already
 template <Real S, ContactBodies B>
-ContactOutcomes<S> decideContacts(std::span<const Contact<S>> contacts, B& bodies,
-                                  const CollisionHook<S>& hook, const S& time, const S& threshold, const S& h,
+ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, const CollisionHook<S>& hook,
+                                  const S& time, const S& threshold, const S& h,
                                   const std::vector<std::pair<std::uint64_t, std::uint64_t>>& decided = {}) {
   ContactOutcomes<S> outcomes;
   const auto partner = [&](std::uint32_t i, std::uint64_t id) {
@@ -46,15 +46,16 @@ ContactOutcomes<S> decideContacts(std::span<const Contact<S>> contacts, B& bodie
         std::find(decided.begin(), decided.end(), std::pair(c.key1, c.key2)) != decided.end()) {
       continue;
     }
-    const Vector3<S> v_rel =
-        Vector3<S>(bodies.velocities()[c.second]) + c.drift - Vector3<S>(bodies.velocities()[c.first]);
+    const Vector3<S> v_rel = Vector3<S>(bodies.velocities()[c.second]) + contacts.drift(c) -
+                             Vector3<S>(bodies.velocities()[c.first]);
     const S approach = -c.normal.dot(v_rel);
     const S a_n = c.normal.dot(Vector3<S>(fall(c.second) - fall(c.first)));
     if (!(approach > threshold + S(2) * (a_n < S(0) ? S(-a_n) : a_n) * h)) {
       continue;
     }
     const Collision<S> hit{
-        time, partner(c.first, c.key1), partner(c.second, c.key2), c.normal, v_rel, c.material, approach};
+        time,    partner(c.first, c.key1), partner(c.second, c.key2), c.normal, v_rel, contacts.material(c),
+        approach};
     const CollisionOutcome<S> outcome = hook(hit);
     if (outcome.kind == CollisionKind::Merge) {
       outcomes.merges.emplace_back(c.key1, c.key2);

@@ -56,8 +56,8 @@ class ContactProblem : public detail::ProblemBodies<S> {
   ///        whose masses have changed are guarded against
   /// \param wrongAt(k) is the change, squared, that a sweep would make in row k
   template <ContactBodies B, class WrongAt>
-  void gather(std::span<const Contact<S>> contacts, const B& source, const ContactColoring& colouring,
-              const S& dt, const ContactSettings<S>& settings, const ContactKinds& kinds,
+  void gather(const ContactView<S>& contacts, const B& source, const ContactColoring& colouring, const S& dt,
+              const ContactSettings<S>& settings, const ContactKinds& kinds,
               const detail::ImpulseList<S>& last, const S& ratio, bool fresh, bool goesOn,
               WrongAt&& wrongAt) {
     friction = kinds.rub || kinds.turn;
@@ -81,11 +81,12 @@ class ContactProblem : public detail::ProblemBodies<S> {
       const ContactColoring::Row& place = colouring.rows()[k];
       const Contact<S>& contact = contacts[place.contact];
       if (fresh) {
-        fill(rows[k], contact, place, source);
+        const Material<S>& material = contacts.material(contact);
+        fill(rows[k], contact, material, place, source);
         gaps_[k] = detail::RestingGap<S>::of(contact);
         if (!turning.empty()) {
           const S r2 = contact.second == staticPartner ? S(0) : S(source.radii()[contact.second]);
-          turning[k] = detail::turningRow<S>(contact.material, source.radii()[contact.first], r2,
+          turning[k] = detail::turningRow<S>(material, source.radii()[contact.first], r2,
                                              bodies[place.slot1].spin, bodies[place.slot2].spin);
         }
       }
@@ -99,7 +100,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
         fetch(later.slot1, later.slot2);
       }
       fillFresh(k);
-      approaches_[k] = aim(k, contacts[colouring.rows()[k].contact], dt, settings, last.normal(k) > S(0));
+      approaches_[k] = aim(k, contacts, colouring.rows()[k].contact, dt, settings, last.normal(k) > S(0));
       most += Most{approaches_[k]};
     };
     const auto look = [&](std::size_t k, Most& part) {
@@ -196,7 +197,8 @@ class ContactProblem : public detail::ProblemBodies<S> {
 
   /// What stays while bodies and surfaces stay.
   template <class B>
-  void fill(Row& row, const Contact<S>& c, const ContactColoring::Row& place, const B& source) const {
+  void fill(Row& row, const Contact<S>& c, const Material<S>& material, const ContactColoring::Row& place,
+            const B& source) const {
     const Body& b1 = bodies[place.slot1];
     const Body& b2 = bodies[place.slot2];
     row.n = c.normal;
@@ -210,13 +212,13 @@ class ContactProblem : public detail::ProblemBodies<S> {
     const S mobility =
         b1.inverseMass + b2.inverseMass + row.c1 * row.c1 * b1.spin + row.c2 * row.c2 * b2.spin;
     row.tangentialMass = detail::reciprocal<S>(mobility);
-    row.stick = c.material.staticFriction * mobility;
-    row.slide = c.material.kineticFriction * mobility;
+    row.stick = material.staticFriction * mobility;
+    row.slide = material.kineticFriction * mobility;
   }
 
   /// What the present velocities ask for. \return change of the normal velocity
-  [[gnu::flatten]] S aim(std::size_t k, const Contact<S>& c, const S& dt, const ContactSettings<S>& settings,
-                         bool loaded) {
+  [[gnu::flatten]] S aim(std::size_t k, const ContactView<S>& contacts, std::uint32_t c, const S& dt,
+                         const ContactSettings<S>& settings, bool loaded) {
     Row& row = rows[k];
     row.slides = 0;
     row.sliding = false;
@@ -228,7 +230,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
     const auto& b1 = initial[row.slot1];
     const auto& b2 = initial[row.slot2];
     const S falls = b1.fall + b2.fall;
-    const Vector3<S> drift = drifting ? speedIn(c.drift) : Vector3<S>(Vector3<S>::Zero());
+    const Vector3<S> drift = drifting ? speedIn(contacts.drift(contacts[c])) : Vector3<S>(Vector3<S>::Zero());
     const S drift_n = row.n.dot(drift);
     const S present = detail::normalVelocity(row, b1, b2);
     const S v_n = present + drift_n;
@@ -250,31 +252,27 @@ class ContactProblem : public detail::ProblemBodies<S> {
     // Newton's law for every contact that gets an impulse (Moreau 1988): v_n^+ = -e v_n^-. One that parts and
     // is pushed back by others may so come to approach, and bounces in its turn in the next step; to stop it
     // here would make energy: J_n (v_n^- + v_n^+) > 0.
-    row.target = impact || parts
-                     ? S(-restitutionAt(c.material, detail::scaled<S>(speed, -speedExponent_)) * v_n)
-                     : S(0);
+    row.target = S(0);
+    if (impact || parts) {
+      const Material<S>& material = contacts.material(contacts[c]);
+      row.target = S(-restitutionAt(material, detail::scaled<S>(speed, -speedExponent_)) * v_n);
+    }
     row.target = impact ? row.target : std::min<S>(row.target, -allowed);
     row.target -= drift_n;
     if (!slipTargets.empty()) {
       Vector3<S>& slipTarget = slipTargets[k];
       slipTarget = drift_n * row.n - drift;
-      if (impact && c.material.tangentialRestitution > S(0)) {
+      const S restored = impact ? contacts.material(contacts[c]).tangentialRestitution : S(0);
+      if (restored > S(0)) {
         const Vector3<S> slip = detail::slipVelocity(row, b1, b2) - slipTarget;
-        slipTarget -= c.material.tangentialRestitution * slip;
+        slipTarget -= restored * slip;
       }
     }
     return row.target - present;
   }
 
   /// Begins with the first guess of a row, whose bodies have it already.
-  void repeat(std::size_t k) {
-    const detail::RowGuess<S> first = firstGuess(k);
-    rows[k].jn = first.jn;
-    rows[k].u = first.u;
-    if (!turning.empty()) {
-      turning[k].l = impulseIn(Vector3<S>(ratio_ * last_->turning(k)));
-    }
-  }
+  void repeat(std::size_t k);
 
   /// Begins with the first guess of a row, if there is one.
   [[gnu::flatten]] void guess(std::size_t k) {

@@ -21,6 +21,16 @@ bool ContactProblem<S>::isPassed(std::size_t k, const ContactColoring& colouring
 }
 
 template <Real S>
+void ContactProblem<S>::repeat(std::size_t k) {
+  const detail::RowGuess<S> first = firstGuess(k);
+  rows[k].jn = first.jn;
+  rows[k].u = first.u;
+  if (!turning.empty()) {
+    turning[k].l = impulseIn(Vector3<S>(ratio_ * last_->turning(k)));
+  }
+}
+
+template <Real S>
 void ContactProblem<S>::recall(const ContactColoring& colouring) {
   parallelFor(rows.size() - colouring.loneCount(), chunk, [&](std::size_t i) {
     const std::size_t k = colouring.loneCount() + i;

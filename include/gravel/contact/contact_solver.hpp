@@ -52,12 +52,12 @@ class ContactSolver {
   /// What the last contacts are remembered by is handed on to those with the same keys. \param contacts
   /// sorted by keys; kept as a view, whose geometry may be renewed before solve(), after correctPositions()
   template <ContactBodies B>
-  void begin(std::span<const Contact<S>> contacts, const B& bodies) {
+  void begin(const ContactView<S>& contacts, const B& bodies) {
     begin(contacts, bodies, ContactFacts<S>::of(contacts, bodies, names_));
   }
   /// \param facts of these contacts, compared with names()
   template <ContactBodies B>
-  void begin(std::span<const Contact<S>> contacts, const B& bodies, const ContactFacts<S>& facts) {
+  void begin(const ContactView<S>& contacts, const B& bodies, const ContactFacts<S>& facts) {
     contacts_ = contacts;
     facts_ = facts;
     fresh_ = true;
@@ -67,20 +67,20 @@ class ContactSolver {
     if (!asMany || facts.others > 0 || !sameMovable(bodies)) {
       before_ = inRows_ ? inOrder(rowImpulses_) : std::move(restored_);
       namesBefore_.swap(names_);
-      coloring_.build(contacts, bodies);
-      handOn(contacts);
+      coloring_.build(contacts.contacts, bodies);
+      handOn(contacts.contacts);
     }
   }
 
   /// The contacts of begin(), at the place where they stand now: after they, or what owns them, were copied.
-  void rebind(std::span<const Contact<S>> contacts) { contacts_ = contacts; }
+  void rebind(const ContactView<S>& contacts) { contacts_ = contacts; }
 
   /// Changes the velocities (and, where there is friction, the spins) of the bodies so that every contact
   /// of begin() obeys restitution and Coulomb's law. A second call takes the contacts to be where they were.
   /// \param dt [s] >= 0, the step for which the contacts stand
   template <ContactBodies B>
   ContactReport<S> solve(B& bodies, const S& dt) {
-    const std::span<const Contact<S>> contacts = contacts_;
+    const ContactView<S>& contacts = contacts_;
     ContactReport<S> report;
     const bool goesOn = goesOn_;
     goesOn_ = false;
@@ -115,7 +115,7 @@ class ContactSolver {
 
   /// begin() and solve() in one.
   template <ContactBodies B>
-  ContactReport<S> solve(std::span<const Contact<S>> contacts, B& bodies, const S& dt) {
+  ContactReport<S> solve(const ContactView<S>& contacts, B& bodies, const S& dt) {
     begin(contacts, bodies);
     return solve(bodies, dt);
   }
@@ -123,7 +123,7 @@ class ContactSolver {
   /// Opens the overlaps of the contacts of begin() by moving bodies.
   template <ContactBodies B>
   CorrectionReport<S> correctPositions(B& bodies, const CorrectionSettings<S>& settings) {
-    return correction_.apply(contacts_, coloring_, bodies, settings, facts_);
+    return correction_.apply(contacts_.contacts, coloring_, bodies, settings, facts_);
   }
 
   /// The contacts of begin() by name; the view holds until the next one.
@@ -136,7 +136,7 @@ class ContactSolver {
 
   /// Contacts of begin(), which are the caller's, and the impulses [N s] of the last solve() in their order.
   /// O(contacts) once a solve; the view holds until the next one.
-  std::span<const Contact<S>> contacts() const { return contacts_; }
+  const ContactView<S>& contacts() const { return contacts_; }
   std::span<const ContactImpulse<S>> impulses() {
     if (!listed_) {
       list_ = copyImpulses();
@@ -290,7 +290,7 @@ class ContactSolver {
   ContactProblem<S> problem_;
   ContactEnergy<S> energy_;
   PositionalCorrection<S> correction_;
-  std::span<const Contact<S>> contacts_;
+  ContactView<S> contacts_;
   std::vector<ContactName> names_;      ///< of the contacts of begin(), or of the memory put back
   detail::ImpulseList<S> rowImpulses_;  ///< in the order of rows
   detail::ImpulseList<S> restored_;     ///< of a memory put back, in place of them

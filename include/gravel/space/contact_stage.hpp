@@ -31,7 +31,7 @@ class ContactStage {
   MaterialTable<Scalar> materials;
   CollisionHook<Scalar> collisionHook;
 
-  const std::vector<Contact<Scalar>>& contacts() const { return contacts_; }
+  const ContactList<Scalar>& contacts() const { return contacts_; }
   const ContactReport<Scalar>& report() const { return report_; }
 
   /// Brings bodies back into the domain. \return the energy that they have more there [J]
@@ -47,7 +47,7 @@ class ContactStage {
     boundaries.setVelocity(plane, velocity);
     for (Contact<Scalar>& c : contacts_) {
       if (c.second == staticPartner && c.key2 == boundaryKey(plane)) {
-        c.drift = velocity;
+        contacts_.setSurface(c, {contacts_.material(c), velocity});
         contactsChanged();
       }
     }
@@ -70,7 +70,7 @@ class ContactStage {
 
   /// All that touched in the last step: contacts() with impulses(), and after them the impacts inside it.
   struct Touches {
-    std::vector<Contact<Scalar>> contacts;
+    ContactList<Scalar> contacts;
     std::vector<ContactImpulse<Scalar>> impulses;
   };
   Touches allTouches() const;
@@ -217,7 +217,7 @@ class ContactStage {
   /// Contacts that nothing can move at either end leave the list, and are forgotten.
   void dropHeld(const Bodies& bodies);
   /// Contacts join the list, with what is remembered of them.
-  void add(std::vector<Contact<Scalar>> contacts, const std::vector<StoredImpulse<Scalar>>& memory);
+  void add(const ContactList<Scalar>& contacts, const std::vector<StoredImpulse<Scalar>>& memory);
 
   void save(SnapshotWriter& out) const;
   /// \throws std::runtime_error, std::invalid_argument if the file does not hold what save() writes
@@ -288,7 +288,7 @@ class ContactStage {
   mutable std::vector<ContactKeys> struck_;
   Scalar margin_ = Scalar(0);  // of the neighbours: what rests may have a gap
   bool searched_ = false;      // neighbours_ hold for the whole drift
-  std::vector<Contact<Scalar>> contacts_;
+  ContactList<Scalar> contacts_;
   ContactSolver<Scalar> solver_;
   StepRecord<Scalar> record_;
   ContactReport<Scalar> report_;

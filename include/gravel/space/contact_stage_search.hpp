@@ -116,7 +116,7 @@ auto ContactStage<Scalar, Layout>::allTouches() const -> Touches {
     c.key2 = impact.key2;
     c.normal = impact.normal;
     c.arm1 = impact.distance;
-    all.contacts.push_back(c);
+    all.contacts.push_back(c, {});
     all.impulses.push_back(impact.impulse);
   }
   return all;

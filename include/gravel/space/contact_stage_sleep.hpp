@@ -61,7 +61,7 @@ void ContactStage<Scalar, Layout>::forEachApproach(const Bodies& bodies, const C
 template <Real Scalar, class Layout>
 void ContactStage<Scalar, Layout>::dropHeld(const Bodies& bodies) {
   const std::vector<StoredImpulse<Scalar>> before = solver_.memory();
-  std::erase_if(contacts_, [&](const Contact<Scalar>& c) {
+  std::erase_if(contacts_.contacts, [&](const Contact<Scalar>& c) {
     return !detail::isMovable(bodies, c.first) &&
            (c.second == staticPartner || !detail::isMovable(bodies, c.second));
   });
@@ -82,7 +82,7 @@ void ContactStage<Scalar, Layout>::dropHeld(const Bodies& bodies) {
 }
 
 template <Real Scalar, class Layout>
-void ContactStage<Scalar, Layout>::add(std::vector<Contact<Scalar>> contacts,
+void ContactStage<Scalar, Layout>::add(const ContactList<Scalar>& contacts,
                                        const std::vector<StoredImpulse<Scalar>>& memory) {
   std::vector<StoredImpulse<Scalar>> all = solver_.memory();
   all.insert(all.end(), memory.begin(), memory.end());
@@ -90,7 +90,9 @@ void ContactStage<Scalar, Layout>::add(std::vector<Contact<Scalar>> contacts,
     return ContactKeys{a.key1, a.key2} < ContactKeys{b.key1, b.key2};
   });
   solver_.setMemory(all, solver_.memoryStep());
-  contacts_.insert(contacts_.end(), contacts.begin(), contacts.end());
+  for (const Contact<Scalar>& c : contacts) {
+    contacts_.push_back(c, contacts.surface(c));
+  }
   std::sort(contacts_.begin(), contacts_.end(),
             [](const Contact<Scalar>& a, const Contact<Scalar>& b) { return keysBefore(a, b); });
   contactsChanged();

@@ -39,10 +39,11 @@ void ContactStage<Scalar, Layout>::save(SnapshotWriter& out) const {
   std::vector<Scalar> places;
   std::vector<Material<Scalar>> pairs;
   for (const Contact<Scalar>& c : contacts_) {
+    const auto& [material, drift] = contacts_.surface(c);
     names.insert(names.end(), {c.first, c.second, c.key1, c.key2});
-    places.insert(places.end(), {c.normal[0], c.normal[1], c.normal[2], c.gap, c.arm1, c.arm2, c.drift[0],
-                                 c.drift[1], c.drift[2]});
-    pairs.push_back(c.material);
+    places.insert(places.end(), {c.normal[0], c.normal[1], c.normal[2], c.gap, c.arm1, c.arm2, drift[0],
+                                 drift[1], drift[2]});
+    pairs.push_back(material);
   }
   out.array("names of contacts", names.data(), names.size());
   out.array("contacts", places.data(), places.size());
@@ -116,9 +117,8 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
                          {c[0], c[1], c[2]},
                          c[3],
                          c[4],
-                         c[5],
-                         pairs[k],
-                         {c[6], c[7], c[8]}});
+                         c[5]},
+                        {pairs[k], {c[6], c[7], c[8]}});
   }
   std::vector<StoredImpulse<Scalar>> memory(keys.size() / 2);
   for (std::size_t k = 0; k < memory.size(); ++k) {

@@ -107,7 +107,7 @@ class SleepStage {
 
   /// Marked islands wake, with their contacts.
   void wake(Bodies& bodies, Contacts& contact) {
-    std::vector<Contact<Scalar>> contacts;
+    ContactList<Scalar> contacts;
     std::vector<StoredImpulse<Scalar>> memory;
     bool any = false;
     for (const SleepingIsland<Scalar>& island : islands_) {
@@ -118,7 +118,7 @@ class SleepStage {
     }
     if (any) {
       std::erase_if(islands_, [](const auto& island) { return island.state == IslandState::Waking; });
-      contact.add(std::move(contacts), memory);
+      contact.add(contacts, memory);
       numbered_ = false;
     }
   }
@@ -160,7 +160,8 @@ class SleepStage {
         continue;  // still, or again, among the others
       }
       for (std::size_t k = 0; k < island.contacts.size(); ++k) {
-        all.contacts.push_back(detail::present(bodies, island.contacts[k]));
+        const Contact<Scalar>& c = island.contacts[k];
+        all.contacts.push_back(detail::present(bodies, c), island.contacts.surface(c));
         all.impulses.push_back(detail::times(island.impulses[k], Scalar(h / island.span)));
       }
     }
@@ -276,7 +277,7 @@ class SleepStage {
   void findTired(const Bodies& bodies, const Contacts& contact, const Config& config, const Scalar& h);
   void putAside(const Bodies& bodies, Contacts& contact);
   void release(Bodies& bodies, const Contacts& contact, const SleepingIsland<Scalar>& island,
-               std::vector<Contact<Scalar>>& contacts, std::vector<StoredImpulse<Scalar>>& memory);
+               ContactList<Scalar>& contacts, std::vector<StoredImpulse<Scalar>>& memory);
 
   std::vector<SleepingIsland<Scalar>> islands_;
   std::vector<Scalar> slow_;        ///< [s] by index, how long a body has been slow

@@ -11,7 +11,7 @@ namespace gravel {
 template <Real Scalar, class Layout>
 void SleepStage<Scalar, Layout>::findTired(const Bodies& bodies, const Contacts& contact,
                                            const Config& config, const Scalar& h) {
-  groups_.find(std::span<const Contact<Scalar>>(contact.contacts()), bodies);
+  groups_.find(std::span<const Contact<Scalar>>(contact.contacts().contacts), bodies);
   std::vector<unsigned char> rests(bodies.size(), 1);
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     if (!detail::isMovable(bodies, i) || slow_[i] < config.sleepTime) {
@@ -44,7 +44,7 @@ void SleepStage<Scalar, Layout>::findTired(const Bodies& bodies, const Contacts&
     if (place == none) {
       continue;
     }
-    found[place].contacts.push_back(c);
+    found[place].contacts.push_back(c, contact.contacts().surface(c));
     found[place].impulses.push_back(impulses[k]);
     const Vector3<Scalar> j = impulses[k].normal * c.normal + impulses[k].tangential;
     if (c.second == staticPartner) {
@@ -98,8 +98,7 @@ void SleepStage<Scalar, Layout>::putAside(const Bodies& bodies, Contacts& contac
 /// The bodies are awake; what the island kept is appended.
 template <Real Scalar, class Layout>
 void SleepStage<Scalar, Layout>::release(Bodies& bodies, const Contacts& contact,
-                                         const SleepingIsland<Scalar>& island,
-                                         std::vector<Contact<Scalar>>& contacts,
+                                         const SleepingIsland<Scalar>& island, ContactList<Scalar>& contacts,
                                          std::vector<StoredImpulse<Scalar>>& memory) {
   for (const RestingBody<Scalar>& member : island.members) {
     if (const auto i = detail::placeOf(bodies, member)) {
@@ -112,7 +111,7 @@ void SleepStage<Scalar, Layout>::release(Bodies& bodies, const Contacts& contact
   const auto isThere = [&](std::uint64_t id) { return bodies.find(BodyId{id}).has_value(); };
   for (const Contact<Scalar>& c : island.contacts) {
     if (isThere(c.key1) && (c.second == staticPartner || isThere(c.key2))) {
-      contacts.push_back(detail::present(bodies, c));
+      contacts.push_back(detail::present(bodies, c), island.contacts.surface(c));
     }
   }
   const Scalar ratio = contact.memoryStep() / island.solved;

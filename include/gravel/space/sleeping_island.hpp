@@ -55,7 +55,7 @@ struct SleepingIsland {
   Scalar fall = Scalar(0);    ///< [m s^-2] mean |a| by mass
   std::vector<RestingBody<Scalar>> members;
   std::vector<RestingBody<Scalar>> supports;  ///< fixed ones
-  std::vector<Contact<Scalar>> contacts;      ///< sorted by keys
+  ContactList<Scalar> contacts;               ///< sorted by keys
   std::vector<ContactImpulse<Scalar>> impulses;
   std::vector<StoredImpulse<Scalar>> memory;  ///< what a solver goes on from
 };

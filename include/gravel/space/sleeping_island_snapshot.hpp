@@ -45,9 +45,9 @@ struct IslandRecord {
       names.insert(names.end(), {c.first, c.second, c.key1, c.key2});
       put(c.normal);
       numbers.insert(numbers.end(), {c.gap, c.arm1, c.arm2});
-      put(c.drift);
+      put(island.contacts.drift(c));
       put(island.impulses[k]);
-      materials.push_back(c.material);
+      materials.push_back(island.contacts.material(c));
     }
     for (const StoredImpulse<Scalar>& m : island.memory) {
       names.insert(names.end(), {m.key1, m.key2});
@@ -100,13 +100,12 @@ class IslandReader {
       c.gap = number();
       c.arm1 = number();
       c.arm2 = number();
-      c.drift = vector();
+      const Vector3<Scalar> drift = vector();
       island.impulses.push_back(impulse());
       if (material_ == materials_.size()) {
         in_.fail("holds too few materials of sleepers");
       }
-      c.material = materials_[material_++];
-      island.contacts.push_back(c);
+      island.contacts.push_back(c, {materials_[material_++], drift});
     }
     for (std::uint64_t k = 0; k < memory; ++k) {
       const std::uint64_t key1 = name();

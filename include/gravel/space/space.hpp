@@ -156,8 +156,8 @@ class Space : public Settings<Scalar> {
   std::size_t contactCount() const { return contact_.touches(); }
   /// What the contact solver reached in the last step.
   const ContactReport<Scalar>& contactReport() const { return contact_.report(); }
-  /// Contacts of the last step, in the order of ids.
-  const std::vector<Contact<Scalar>>& contacts() const { return contact_.contacts(); }
+  /// Contacts of the last step, in the order of ids; the surfaces of a contact c: contacts().material(c).
+  const ContactList<Scalar>& contacts() const { return contact_.contacts(); }
   /// Impulses [N s] over the last step, in the order of contacts(). A contact's mean force is its impulse
   /// over getPreviousTimeStep().
   std::vector<ContactImpulse<Scalar>> contactImpulses() const { return contact_.impulses(); }

@@ -74,7 +74,7 @@ std::size_t Space<Scalar, Layout>::chooseParts(const Scalar& h) {
   Scalar rate_sq(0);
   for (const Contact<Scalar>& c : contacts()) {
     const bool boundary = c.second == staticPartner;
-    Vector v = -Vector(bodies_.velocities()[c.first]) + c.drift;
+    Vector v = -Vector(bodies_.velocities()[c.first]) + contacts().drift(c);
     Vector a = -Vector(bodies_.accelerations()[c.first]);
     Scalar r = bodies_.radii()[c.first];
     if (!boundary) {

@@ -1,0 +1,97 @@
+#pragma once
+
+/// \file
+/// Where bodies touch boundaries.
+
+#include <gravel/contact/contact_search.hpp>
+#include <gravel/contact/surface_numbers.hpp>
+
+namespace gravel::detail {
+
+/// Finds the contacts of half-spaces, for the narrow phase.
+template <Real S>
+class BoundaryContacts {
+ public:
+  /// The arguments are those of NarrowPhase::find(). Surfaces are numbered from materials.size() on.
+  template <class B>
+  void find(const B& bodies, std::span<const Material<S>> materials, std::span<const HalfSpace<S>> boundaries,
+            const NarrowPhaseSettings<S>& settings,
+            std::optional<std::span<const std::uint32_t>> nearBoundaries) {
+    for (std::size_t b = 1; b < boundaries.size(); ++b) {
+      if (boundaries[b].number <= boundaries[b - 1].number) {
+        refuse("number of boundary " + std::to_string(b), std::to_string(boundaries[b].number),
+               "above that of the one before it, " + std::to_string(boundaries[b - 1].number));
+      }
+    }
+    contacts_.clear();
+    surfaces_.clear();
+    if (boundaries.empty() || (nearBoundaries && nearBoundaries->empty())) {
+      return;
+    }
+    const std::size_t count = nearBoundaries ? nearBoundaries->size() : bodies.size();
+    const std::size_t used =
+        gatherContacts(count, parts_, [&](std::size_t k, Part& part, RestingCursor& cursor) {
+          append(nearBoundaries ? (*nearBoundaries)[k] : k, bodies, materials, boundaries, settings, part,
+                 cursor);
+        });
+    for (const Part& part : std::span(parts_).first(used)) {
+      const auto first = static_cast<std::uint32_t>(materials.size() + surfaces_.size());
+      for (Contact<S> c : part.contacts) {
+        c.surface += first;
+        contacts_.push_back(c);
+      }
+      const std::vector<ContactSurface<S>>& surfaces = part.surfaces.surfaces();
+      surfaces_.insert(surfaces_.end(), surfaces.begin(), surfaces.end());
+    }
+    const auto before = [](const Contact<S>& a, const Contact<S>& b) { return keysBefore(a, b); };
+    if (!std::is_sorted(contacts_.begin(), contacts_.end(), before)) {
+      std::sort(contacts_.begin(), contacts_.end(), before);
+    }
+  }
+
+  /// Sorted by keys.
+  const std::vector<Contact<S>>& contacts() const { return contacts_; }
+  const std::vector<ContactSurface<S>>& surfaces() const { return surfaces_; }
+
+ private:
+  /// Contacts with boundaries, and their surfaces numbered from 0.
+  struct Part {
+    std::vector<Contact<S>> contacts;
+    SurfaceNumbers<S> surfaces;
+    void clear() {
+      contacts.clear();
+      surfaces.clear();
+    }
+  };
+
+  template <class B>
+  static void append(std::size_t i, const B& bodies, std::span<const Material<S>> materials,
+                     std::span<const HalfSpace<S>> boundaries, const NarrowPhaseSettings<S>& settings,
+                     Part& part, RestingCursor& cursor) {
+    const S radius = bodies.radii()[i];
+    const Vector3<S> x = bodies.positions()[i];
+    for (const HalfSpace<S>& wall : boundaries) {
+      if (!(wall.normal.dot(x) - wall.offset < radius + widestMargin(settings, radius))) {
+        continue;
+      }
+      const S margin = marginOf(settings, radius, [&] { return accelerationOf<S>(bodies, i); });
+      const auto touch = sphereHalfSpace<S>(x, radius, wall.normal, wall.offset, margin);
+      if (touch && isMovable(bodies, i) &&
+          (touch->gap < settings.margin ||
+           mayRest(settings, {bodies.ids()[i], boundaryKey(wall.number)}, cursor))) {
+        const std::uint32_t m = bodies.materials()[i];
+        const std::uint32_t number = part.surfaces.of(
+            m, wall.number, wall.velocity, [&] { return mix(surfaceOf(materials, m), wall.material); });
+        part.contacts.push_back({static_cast<std::uint32_t>(i), staticPartner, bodies.ids()[i],
+                                 boundaryKey(wall.number), touch->normal, touch->gap, touch->arm1,
+                                 touch->arm2, number});
+      }
+    }
+  }
+
+  std::vector<Part> parts_;
+  std::vector<Contact<S>> contacts_;
+  std::vector<ContactSurface<S>> surfaces_;
+};
+
+}  // namespace gravel::detail

@@ -1,0 +1,105 @@
+#pragma once
+
+/// \file
+/// What decides whether two surfaces touch, a gap between them that rests included.
+
+#include <gravel/contact/contact_bodies.hpp>
+#include <gravel/contact/resting_gap.hpp>
+#include <gravel/core/check.hpp>
+#include <gravel/core/parallel.hpp>
+
+#include <algorithm>
+#include <optional>
+#include <span>
+#include <string>
+
+namespace gravel {
+
+/// Settings of a search for contacts.
+template <Real Scalar>
+struct NarrowPhaseSettings {
+  Scalar time = Scalar(0);     ///< [s], for a sheared domain
+  Scalar epsilon = Scalar(0);  ///< [m] centres closer than this (and than rounding) count as one point
+  Scalar margin = Scalar(0);   ///< [m] pairs with a gap below this are contacts too; 0 takes overlaps only
+  /// [s] step, or 0. What rests on something is carried through a step with a gap that opens and closes by
+  /// rounding and by the curvature of its path; it stays a contact while the accelerations of the two can
+  /// close the gap within the step, gap < (|a_1| + |a_2|) step^2, and the gap is below a thousandth of the
+  /// radii. Such a contact may approach until its gap is closed.
+  Scalar step = Scalar(0);
+  /// Who rests on whom, sorted: only these stay contacts with a gap. Without it every pair so near does.
+  std::optional<std::span<const ContactName>> resting = std::nullopt;
+  std::span<const ContactName> before{};  ///< with which those found are compared: facts()
+};
+
+namespace detail {
+
+/// |a| of a body that contacts can move, else 0.
+template <Real S, class B>
+[[gnu::always_inline]] inline S accelerationOf(const B& bodies, std::size_t i) {
+  return isMovable(bodies, i) ? safeNorm(Vector3<S>(bodies.accelerations()[i])) : S(0);
+}
+
+/// The gap below which two with this sum of radii touch. \param acceleration() is asked for only where a step
+/// is given
+template <Real S, class Acceleration>
+[[gnu::always_inline]] inline S marginOf(const NarrowPhaseSettings<S>& settings, const S& radii,
+                                         Acceleration&& acceleration) {
+  if (!(settings.step > S(0))) {
+    return settings.margin;
+  }
+  const S closing = acceleration() * settings.step * settings.step;
+  return std::max<S>(settings.margin, std::min<S>(closing, restingMargin<S>() * radii));
+}
+
+/// What marginOf() is at most.
+template <Real S>
+S widestMargin(const NarrowPhaseSettings<S>& settings, const S& radii) {
+  return settings.step > S(0) ? std::max<S>(settings.margin, restingMargin<S>() * radii) : settings.margin;
+}
+
+/// Where a chunk has got to in the list of those who rest; its own pairs come in the same order.
+using RestingCursor = std::size_t;
+
+template <Real S>
+bool mayRest(const NarrowPhaseSettings<S>& settings, const ContactKeys& keys, RestingCursor& cursor) {
+  if (!settings.resting) {
+    return true;
+  }
+  const std::span<const ContactName> resting = *settings.resting;
+  const auto found = placeOf(resting, keys, cursor);
+  cursor = static_cast<std::size_t>(found - resting.begin());
+  return found != resting.end() && found->keys == keys;
+}
+
+template <Real S>
+const Material<S>& surfaceOf(std::span<const Material<S>> materials, std::uint32_t id) {
+  if (id >= materials.size()) {
+    refuse("material of a body", std::to_string(id),
+           "below the number of materials, " + std::to_string(materials.size()));
+  }
+  return materials[id];
+}
+
+inline constexpr std::size_t contactChunk = 2048;
+
+/// Calls append(k, part, cursor) for k = 0 … n-1 in chunks. \return their number
+template <class Part, class Append>
+std::size_t gatherContacts(std::size_t n, std::vector<Part>& parts, Append&& append) {
+  const std::size_t used = (n + contactChunk - 1) / contactChunk;
+  if (parts.size() < used) {
+    parts.resize(used);
+  }
+  parallelForChunks<Share::Alike>(n, contactChunk, [&](std::size_t begin, std::size_t end) {
+    Part& part = parts[begin / contactChunk];
+    part.clear();
+    RestingCursor cursor = 0;
+    for (std::size_t k = begin; k < end; ++k) {
+      append(k, part, cursor);
+    }
+  });
+  return used;
+}
+
+}  // namespace detail
+
+}  // namespace gravel
