@@ -136,18 +136,20 @@ class NarrowPhase {
     for (const ContactSurface<S>& surface : walls_.surfaces()) {
       facts_.kinds.include(surface);
     }
+    shifts_.clear();
     for (std::size_t p = 0; p < used; ++p) {
       const auto shift = static_cast<std::uint32_t>(out.surfaces.size()) - common;
       for (const ContactSurface<S>& surface : own_[p].surfaces()) {
         facts_.kinds.include(surface);
         out.surfaces.push_back(surface);
       }
-      if (shift > 0 && !own_[p].surfaces().empty()) {
-        for (std::size_t k = starts_[p].place; k < starts_[p + 1].place; ++k) {
-          out[k].surface += out[k].surface < common ? 0 : shift;
-        }
-      }
+      shifts_.push_back(own_[p].surfaces().empty() ? 0 : shift);
     }
+    parallelForTasks<Share::Alike>(used, [&](std::size_t p) {
+      for (std::size_t k = starts_[p].place; shifts_[p] > 0 && k < starts_[p + 1].place; ++k) {
+        out[k].surface += out[k].surface < common ? 0 : shifts_[p];
+      }
+    });
     for (const ContactFacts<S>& part : factsOfParts_) {
       facts_ += part;
     }
@@ -215,6 +217,7 @@ class NarrowPhase {
   std::vector<Sphere> spheres_;
   std::vector<std::vector<Pair>> parts_;
   std::vector<detail::SurfaceNumbers<S>> own_;  ///< by part: of pairs of two materials, and that drift
+  std::vector<std::uint32_t> shifts_;           ///< by part: what its own numbers begin at, less `common`
   std::vector<Start> starts_;
   detail::BoundaryContacts<S> walls_;
   std::vector<ContactFacts<S>> factsOfParts_;

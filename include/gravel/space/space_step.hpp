@@ -103,7 +103,7 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration, const Sc
   }
   std::tie(time_, timeRest_) = timeAfter(h);
   ++steps_;
-  stepGoesOn_ = contactCount() == 0;
+  stepGoesOn_ = contacts().empty() && impacts().empty();
   updateAdaptiveTimeStep();
   logSystemEnergy(iteration);
   profiler_.repeatSkips(more);
