@@ -84,8 +84,8 @@ int main(int argc, char** argv) {
     const Errors errors = errorsOf(now);
     std::printf(
         "gravel, %zu bodies, e = %g: %.3f s for a simulated second (%zu steps; median of 5)\n"
-        "overlap/R mean %.1e largest %.1e, kinetic/(N m g R) %.1e, weight error %.1e\n",
+        "overlap/R mean %.1e largest %.1e, kinetic/(N m g R) %.1e, of centres %.1e, weight error %.1e\n",
         n, e, median(seconds), perSecond, errors.meanOverlap, errors.largestOverlap, errors.kinetic,
-        now.supportedWeight().residual());
+        errors.moving, now.supportedWeight().residual());
   }
 }

@@ -116,7 +116,8 @@ gravel::Space<S> spaceOf(const Scene& scene, gravel::SimulationConfig<S> config)
 struct Errors {
   double meanOverlap = 0;     ///< over the smaller radius, of all contacts
   double largestOverlap = 0;  ///< the same
-  double kinetic = 0;         ///< over sum m g R
+  double kinetic = 0;         ///< over sum m g R, with spins
+  double moving = 0;          ///< the same of centres alone: nothing stops a ball that spins on its pole
 };
 
 template <class S>
@@ -143,6 +144,7 @@ Errors errorsOf(const gravel::Space<S>& space) {
     scale += static_cast<double>(space.body(i).mass()) * g * radii(static_cast<std::uint32_t>(i));
   }
   errors.kinetic = kineticEnergy(space) / scale;
+  errors.moving = static_cast<double>(std::get<0>(space.calculateSystemEnergy())) / scale;
   return errors;
 }
 
