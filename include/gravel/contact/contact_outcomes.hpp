@@ -4,12 +4,14 @@
 /// The user's outcomes of collisions that the solver of simultaneous contacts would deal.
 
 #include <gravel/contact/collision_outcome.hpp>
-#include <gravel/contact/contact.hpp>
 #include <gravel/contact/contact_bodies.hpp>
+#include <gravel/contact/contact_list.hpp>
 
 #include <algorithm>
+#include <cstdint>
 #include <span>
 #include <utility>
+#include <vector>
 
 namespace gravel {
 
