@@ -4,6 +4,7 @@
 /// Solves the contacts of a step together: the run-time choice of an algorithm, with what all of them need,
 /// colours, warm start, losses and correction of positions.
 
+#include <gravel/contact/earlier_impulses.hpp>
 #include <gravel/contact/positional_correction.hpp>
 #include <gravel/contact/sequential_impulses.hpp>
 
@@ -65,10 +66,15 @@ class ContactSolver {
     const bool asMany = contacts.size() == names_.size() && contacts.size() == coloring_.rows().size();
     // The same pairs of the same bodies: colours, and who is remembered, stay.
     if (!asMany || facts.others > 0 || !sameMovable(bodies)) {
-      before_ = inRows_ ? inOrder(rowImpulses_) : std::move(restored_);
-      namesBefore_.swap(names_);
+      using Rows = std::span<const ContactColoring::Row>;
+      before_.take(names_, inRows_ ? rowImpulses_ : restored_, inRows_ ? coloring_.rows() : Rows{});
       coloring_.build(contacts.contacts, bodies);
-      handOn(contacts.contacts);
+      before_.handOn(contacts.contacts, coloring_.rows(), names_, rowImpulses_);
+      handedOn_ = true;
+      otherRows_ = true;
+      listed_ = false;
+      sameNames_ = false;
+      inRows_ = true;
     }
   }
 
@@ -145,7 +151,7 @@ class ContactSolver {
     return list_;
   }
   std::vector<ContactImpulse<S>> copyImpulses() const {
-    return inRows_ ? inOrder(rowImpulses_).listed() : restored_.listed();
+    return inRows_ ? inOrder(rowImpulses_) : restored_.listed([](std::size_t k) { return k; });
   }
 
   /// sum J.(dv_2 - dv_1) of the last solve(), along the normals and across [J]: what its impulses do to
@@ -182,9 +188,11 @@ class ContactSolver {
   }
 
   /// Of the solve before the last one, whose contacts may have been others, in the order of their keys.
-  const ContactKeys& earlierKeys(std::size_t k) const { return (sameNames_ ? names_ : namesBefore_)[k].keys; }
+  const ContactKeys& earlierKeys(std::size_t k) const {
+    return sameNames_ ? names_[k].keys : before_.keys(k);
+  }
   std::vector<ContactImpulse<S>> earlierImpulses() const {
-    return sameNames_ ? inOrder(rowsBefore_).listed() : before_.listed();
+    return sameNames_ ? inOrder(rowsBefore_) : before_.listed();
   }
 
   /// What the next solve() begins from: the impulses of the last one by keys, and its step [s]. A restart
@@ -214,8 +222,7 @@ class ContactSolver {
   /// \param memory sorted by keys
   void setMemory(const std::vector<StoredImpulse<S>>& memory, const S& step) {
     if (sameNames_) {
-      before_ = inOrder(rowsBefore_);
-      namesBefore_.swap(names_);
+      before_.take(names_, rowsBefore_, coloring_.rows());
       sameNames_ = false;
     }
     names_.clear();
@@ -250,37 +257,10 @@ class ContactSolver {
   }
 
   /// From the order of rows to that of contacts.
-  detail::ImpulseList<S> inOrder(const detail::ImpulseList<S>& ofRows) const {
-    return ofRows.moved([&](std::size_t r) { return coloring_.rows()[r].contact; });
-  }
-
-  /// What `before_` holds of these contacts goes to their rows.
-  void handOn(std::span<const Contact<S>> contacts) {
-    handedOn_ = true;
-    otherRows_ = true;
-    listed_ = false;
-    sameNames_ = false;
-    inRows_ = true;
-    names_.resize(contacts.size());
-    origins_.resize(contacts.size());
-    parallelForChunks<Share::Alike>(contacts.size(), chunk, [&](std::size_t begin, std::size_t end) {
-      const auto earlier = [](const ContactName& name, const ContactKeys& keys) { return name.keys < keys; };
-      auto old = std::lower_bound(namesBefore_.begin(), namesBefore_.end(),
-                                  ContactName::of(contacts[begin]).keys, earlier);
-      for (std::size_t k = begin; k < end; ++k) {
-        names_[k] = ContactName::of(contacts[k]);
-        while (old != namesBefore_.end() && old->keys < names_[k].keys) {
-          ++old;
-        }
-        const bool known = old != namesBefore_.end() && old->keys == names_[k].keys;
-        origins_[k] = known ? static_cast<std::uint32_t>(old - namesBefore_.begin()) : staticPartner;
-      }
-    });
-    rowImpulses_.resize(contacts.size(), before_.turns());
-    parallelFor(contacts.size(), chunk, [&](std::size_t r) {
-      const std::uint32_t origin = origins_[coloring_.rows()[r].contact];
-      rowImpulses_.set(r, origin != staticPartner ? before_.get(origin) : ContactImpulse<S>{});
-    });
+  std::vector<ContactImpulse<S>> inOrder(const detail::ImpulseList<S>& ofRows) const {
+    std::vector<std::uint32_t> rowOf;
+    detail::findRows(coloring_.rows(), rowOf);
+    return ofRows.listed([&](std::size_t k) { return rowOf[k]; });
   }
 
   std::variant<SequentialImpulses<S>> algorithm_;
@@ -297,11 +277,9 @@ class ContactSolver {
   bool inRows_ = true;
   std::vector<ContactImpulse<S>> list_;  ///< of impulses(), if `listed_`
   bool listed_ = false;
-  std::vector<ContactName> namesBefore_;
-  detail::ImpulseList<S> before_;       ///< of the solve before, in the order of these names
-  detail::ImpulseList<S> rowsBefore_;   ///< the same where rows are still the same: `sameNames_`
-  std::vector<std::uint32_t> origins_;  ///< by contact: where `before_` has it, or staticPartner
-  std::vector<Vector3<S>> changes_;     ///< by slot: of workOn()
+  detail::EarlierImpulses<S> before_;  ///< of the contacts before
+  detail::ImpulseList<S> rowsBefore_;  ///< the same where rows are still the same: `sameNames_`
+  std::vector<Vector3<S>> changes_;    ///< by slot: of workOn()
   S memoryStep_ = S(0);
   bool handedOn_ = false;   ///< no solve() since
   bool goesOn_ = false;     ///< the last solve() was of these contacts, where they stand

@@ -52,18 +52,11 @@ class ImpulseList {
     }
   }
 
-  /// Entry k as entry placeOf(k) of another list of this length.
+  /// All, entry placeOf(k) as the k-th.
   template <class PlaceOf>
-  ImpulseList moved(PlaceOf&& placeOf) const {
-    ImpulseList all;
-    all.resize(size(), turns());
-    parallelFor(size(), chunk, [&](std::size_t k) { all.set(placeOf(k), get(k)); });
-    return all;
-  }
-
-  std::vector<ContactImpulse<S>> listed() const {
+  std::vector<ContactImpulse<S>> listed(PlaceOf&& placeOf) const {
     std::vector<ContactImpulse<S>> all(size());
-    parallelFor(size(), chunk, [&](std::size_t k) { all[k] = get(k); });
+    parallelFor(size(), chunk, [&](std::size_t k) { all[k] = get(placeOf(k)); });
     return all;
   }
 
