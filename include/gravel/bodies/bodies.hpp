@@ -49,10 +49,8 @@ class Bodies {
   /// orientations normalised, all else stays. \throws std::invalid_argument if a body's values are out of
   /// range; then the storage's memory was not written to
   explicit Bodies(Storage storage) : storage_(std::move(storage)) {
-    reserve(size());
     for (std::size_t i = 0; i < size(); ++i) {
       validate(adopted(i), "body " + std::to_string(i));
-      index_.emplace(i, i);
     }
     for (; nextId_ < size(); ++nextId_) {
       const auto i = static_cast<std::size_t>(nextId_);
@@ -79,11 +77,11 @@ class Bodies {
   /// moves.
   std::uint64_t revision() const { return revision_; }
 
+  /// Room for n bodies in all, where the storage can make some.
   void reserve(std::size_t n) {
     if constexpr (requires { storage_.reserve(n); }) {
       storage_.reserve(n);
     }
-    index_.reserve(n);
   }
 
   /// Appends a body. \throws std::invalid_argument if a value is out of range; then nothing is added.
@@ -93,7 +91,7 @@ class Bodies {
   /// all ids ever given. \throws std::invalid_argument also if the id is taken.
   BodyId add(const Body<Scalar>& body, BodyId id) {
     const std::uint64_t key = toInteger(id);
-    if (index_.contains(key) || id == noBody) {
+    if (find(id) || id == noBody) {
       detail::refuse("id of the new body", std::to_string(key),
                      "an id that no other body of this space has, below 2^64 - 1");
     }
@@ -103,7 +101,9 @@ class Bodies {
     try {
       storage_.at(fields::Id{}, i) = key;
       (*this)[i].store(body);
-      index_.emplace(key, i);
+      if (key != i) {
+        elsewhere_.emplace(key, i);
+      }
     } catch (...) {
       storage_.resize(i);
       throw;
@@ -123,16 +123,12 @@ class Bodies {
   /// field. The own storage stays the same object: a user's arrays are written to.
   template <class Other>
   void assign(const Bodies<Scalar, Other>& other) {
-    decltype(index_) index;
-    index.reserve(other.size());
-    for (std::size_t i = 0; i < other.size(); ++i) {
-      index.emplace(toInteger(other[i].id()), i);
-    }
+    auto elsewhere = indicesElsewhere(other.size(), [&](std::size_t i) { return toInteger(other[i].id()); });
     storage_.resize(other.size());
     for (std::size_t i = 0; i < size(); ++i) {
       detail::copyBody(storage_, i, other.storage(), i);
     }
-    index_.swap(index);
+    elsewhere_.swap(elsewhere);
     nextId_ = toInteger(other.nextId());
     ++revision_;
   }
@@ -142,21 +138,30 @@ class Bodies {
     const std::size_t i = indexOf(id);
     const std::size_t last = size() - 1;
     if (i != last) {
+      const std::uint64_t moved = storage_.at(fields::Id{}, last);
+      if (moved == i) {
+        elsewhere_.erase(moved);
+      } else {
+        elsewhere_[moved] = i;  // may throw: nothing has moved yet
+      }
       if constexpr (requires { storage_.swap(i, last); }) {
         storage_.swap(i, last);
       } else {
         detail::copyBody(storage_, i, std::as_const(storage_), last);
       }
-      index_[storage_.at(fields::Id{}, i)] = i;
     }
     storage_.resize(last);
-    index_.erase(toInteger(id));
+    elsewhere_.erase(toInteger(id));
     ++revision_;
   }
 
   std::optional<std::size_t> find(BodyId id) const {
-    const auto entry = index_.find(toInteger(id));
-    return entry == index_.end() ? std::nullopt : std::optional<std::size_t>(entry->second);
+    const std::uint64_t key = toInteger(id);
+    if (key < size() && storage_.at(fields::Id{}, static_cast<std::size_t>(key)) == key) {
+      return static_cast<std::size_t>(key);
+    }
+    const auto entry = elsewhere_.find(key);
+    return entry == elsewhere_.end() ? std::nullopt : std::optional<std::size_t>(entry->second);
   }
 
   /// \throws std::out_of_range for an unknown id
@@ -180,10 +185,10 @@ class Bodies {
       }
       seen[from] = true;
     }
+    auto elsewhere =
+        indicesElsewhere(size(), [&](std::size_t i) { return storage_.at(fields::Id{}, order[i]); });
     detail::permute(storage_, order);
-    for (std::size_t i = 0; i < size(); ++i) {
-      index_[storage_.at(fields::Id{}, i)] = i;
-    }
+    elsewhere_.swap(elsewhere);
     ++revision_;
   }
 
@@ -226,6 +231,21 @@ class Bodies {
   auto flags() const { return Column<const Storage, fields::Flags>(storage_); }
 
  private:
+  using Indices = std::unordered_map<std::uint64_t, std::size_t>;
+
+  /// Of those among `count` bodies whose id is not their index.
+  template <class IdAt>
+  static Indices indicesElsewhere(std::size_t count, IdAt&& idAt) {
+    Indices indices;
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::uint64_t id = idAt(i);
+      if (id != i) {
+        indices.emplace(id, i);
+      }
+    }
+    return indices;
+  }
+
   void validateOne(std::size_t i) const {
     const auto body = (*this)[i];
     const Scalar m = body.mass();
@@ -291,7 +311,7 @@ class Bodies {
   }
 
   Storage storage_;
-  std::unordered_map<std::uint64_t, std::size_t> index_;
+  Indices elsewhere_;  ///< of bodies whose id is not their index; few, until some are removed or reordered
   std::uint64_t nextId_ = 0;
   std::uint64_t revision_ = 0;
 };
