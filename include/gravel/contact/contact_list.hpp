@@ -5,11 +5,22 @@
 
 #include <gravel/contact/contact.hpp>
 
-#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <limits>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 namespace gravel {
+
+namespace detail {
+
+/// A user's scalar may be more than its value, a derivative say: equal is not the same.
+template <Real S>
+inline constexpr bool equalIsSame = std::is_floating_point_v<S>;
+
+}  // namespace detail
 
 /// What is between the two sides of a contact.
 template <Real Scalar>
@@ -61,11 +72,9 @@ struct ContactList {
   const Material<Scalar>& material(const Contact<Scalar>& c) const { return surface(c).material; }
   const Vector3<Scalar>& drift(const Contact<Scalar>& c) const { return surface(c).drift; }
 
-  /// Of this contact alone. O(1): a surface that nobody has any more stays until clear().
+  /// Of this contact alone. O(1): a surface that nobody has any more stays until setDrift() or clear().
   void setSurface(Contact<Scalar>& c, const ContactSurface<Scalar>& surface) {
-    // A user's scalar may be more than its value, a derivative say: equal is not the same.
-    const bool comparable = std::is_floating_point_v<Scalar>;
-    if (surfaces.empty() || !comparable || !(surfaces.back() == surface)) {
+    if (surfaces.empty() || !detail::equalIsSame<Scalar> || !(surfaces.back() == surface)) {
       surfaces.push_back(surface);
     }
     c.surface = static_cast<std::uint32_t>(surfaces.size() - 1);
@@ -77,6 +86,29 @@ struct ContactList {
   void clear() {
     contacts.clear();
     surfaces.clear();
+  }
+
+  /// Another drift for the contacts c that which(c) tells; those that shared a surface share the new one, and
+  /// surfaces that no contact has are forgotten. O(contacts + surfaces). \return whether there are any
+  template <class Which>
+  bool setDrift(const Vector3<Scalar>& drift, Which&& which) {
+    constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+    std::vector<std::array<std::uint32_t, 2>> numbers(surfaces.size(), {none, none});  // old and new drift
+    std::vector<ContactSurface<Scalar>> used;
+    bool any = false;
+    for (Contact<Scalar>& c : contacts) {
+      const bool other = which(c);
+      std::uint32_t& number = numbers[c.surface][other ? 1 : 0];
+      if (number == none) {
+        number = static_cast<std::uint32_t>(used.size());
+        used.push_back(surfaces[c.surface]);
+        used.back().drift = other ? drift : used.back().drift;
+      }
+      c.surface = number;
+      any = any || other;
+    }
+    surfaces.swap(used);
+    return any;
   }
 };
 

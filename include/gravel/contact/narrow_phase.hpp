@@ -116,9 +116,11 @@ class NarrowPhase {
         const std::uint32_t m_i = bodies.materials()[i];
         const std::uint32_t m_j = bodies.materials()[j];
         out[place] = {i, j, keys.first, keys.second, touch.normal, touch.gap, touch.arm1, touch.arm2, m_i};
-        if (m_i != m_j || !(drift == Vector3<S>::Zero())) {
-          out[place].surface = common + own.of(m_i, m_j, drift, [&] {
-            return m_i == m_j ? materials[m_i] : mix(materials[m_i], materials[m_j]);
+        const bool drifts = detail::equalIsSame<S> ? !(drift == Vector3<S>::Zero()) : !domain.isOpen();
+        if (m_i != m_j || drifts) {
+          const auto [m_1, m_2] = std::minmax(m_i, m_j);
+          out[place].surface = common + own.of(m_1, m_2, drift, [&, m_1 = m_1, m_2 = m_2] {
+            return m_1 == m_2 ? materials[m_1] : mix(materials[m_1], materials[m_2]);
           });
         } else if (m_i != alike) {
           alike = m_i;
@@ -136,18 +138,23 @@ class NarrowPhase {
     for (const ContactSurface<S>& surface : walls_.surfaces()) {
       facts_.kinds.include(surface);
     }
-    shifts_.clear();
+    allOwn_.clear();
+    numbers_.clear();
+    firstNumbers_.assign(1, 0);
     for (std::size_t p = 0; p < used; ++p) {
-      const auto shift = static_cast<std::uint32_t>(out.surfaces.size()) - common;
-      for (const ContactSurface<S>& surface : own_[p].surfaces()) {
-        facts_.kinds.include(surface);
-        out.surfaces.push_back(surface);
-      }
-      shifts_.push_back(own_[p].surfaces().empty() ? 0 : shift);
+      allOwn_.add(own_[p], numbers_);
+      firstNumbers_.push_back(numbers_.size());
+    }
+    for (const ContactSurface<S>& surface : allOwn_.surfaces()) {
+      facts_.kinds.include(surface);
+      out.surfaces.push_back(surface);
     }
     parallelForTasks<Share::Alike>(used, [&](std::size_t p) {
-      for (std::size_t k = starts_[p].place; shifts_[p] > 0 && k < starts_[p + 1].place; ++k) {
-        out[k].surface += out[k].surface < common ? 0 : shifts_[p];
+      const std::size_t first = firstNumbers_[p];
+      const bool any = first < firstNumbers_[p + 1];
+      for (std::size_t k = starts_[p].place; any && k < starts_[p + 1].place; ++k) {
+        std::uint32_t& number = out[k].surface;
+        number = number < common ? number : common + numbers_[first + (number - common)];
       }
     });
     for (const ContactFacts<S>& part : factsOfParts_) {
@@ -217,7 +224,9 @@ class NarrowPhase {
   std::vector<Sphere> spheres_;
   std::vector<std::vector<Pair>> parts_;
   std::vector<detail::SurfaceNumbers<S>> own_;  ///< by part: of pairs of two materials, and that drift
-  std::vector<std::uint32_t> shifts_;           ///< by part: what its own numbers begin at, less `common`
+  detail::SurfaceNumbers<S> allOwn_;            ///< of all parts
+  std::vector<std::uint32_t> numbers_;          ///< there, of each of each part's own
+  std::vector<std::size_t> firstNumbers_;       ///< by part
   std::vector<Start> starts_;
   detail::BoundaryContacts<S> walls_;
   std::vector<ContactFacts<S>> factsOfParts_;

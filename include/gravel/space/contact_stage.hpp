@@ -45,11 +45,11 @@ class ContactStage {
   /// The plane moves on at another velocity; what rests on it feels that at once.
   void setPlaneVelocity(std::size_t plane, const Vector3<Scalar>& velocity) {
     boundaries.setVelocity(plane, velocity);
-    for (Contact<Scalar>& c : contacts_) {
-      if (c.second == staticPartner && c.key2 == boundaryKey(plane)) {
-        contacts_.setSurface(c, {contacts_.material(c), velocity});
-        contactsChanged();
-      }
+    const auto onPlane = [&](const Contact<Scalar>& c) {
+      return c.second == staticPartner && c.key2 == boundaryKey(plane);
+    };
+    if (contacts_.setDrift(velocity, onPlane)) {
+      contactsChanged();
     }
   }
 
