@@ -102,6 +102,7 @@ gravel::Space<S> spaceOf(const Scene& scene, gravel::SimulationConfig<S> config)
                    scene.smoothSides && normal[2] == 0 ? smooth : gravel::defaultMaterial);
   }
   space.setUniformField({0, 0, static_cast<S>(-scene.g)});
+  space.reserve(scene.bodies.size());
   for (const gravel::Body<double>& body : scene.bodies) {
     gravel::Body<S> same;
     same.position = body.position.template cast<S>();

@@ -117,9 +117,9 @@ class ImpactEvents : private detail::ImpactForecast<S> {
   }
 
   void clear() {
-    impacts_.clear();
+    detail::clearSpare(impacts_);
     earlier_.clear();
-    turns_.clear();
+    detail::clearSpare(turns_);
     merges_.clear();
     late_.clear();
   }

@@ -53,18 +53,19 @@ class BroadPhase {
   void findPairs(const Positions& positions, const Radii& radii, const Ids& ids, const S& margin,
                  const Domain<S>& domain, const S& time, std::vector<Pair>& out) {
     detail::require("margin of a pair search", margin, detail::nonNegative<S>());
-    detail::gatherSpheres(positions, radii, ids, domain, time, spheres_);
-    if (std::none_of(spheres_.begin(), spheres_.end(), [](const auto& s) { return s.radius > S(0); })) {
+    std::vector<detail::Sphere<S>> spheres;  // not kept: 64 bytes a body, for a search in many steps
+    detail::gatherSpheres(positions, radii, ids, domain, time, spheres);
+    if (std::none_of(spheres.begin(), spheres.end(), [](const auto& s) { return s.radius > S(0); })) {
       out.clear();  // points alone: nothing to search
       return;
     }
     if constexpr (std::is_floating_point_v<S>) {
-      if (kind_ == BroadPhaseKind::Automatic && spheres_.size() > fewBodies) {
-        const UniformGrid<S>& grid = use<GridPairs<S>>().build(spheres_, margin);
+      if (kind_ == BroadPhaseKind::Automatic && spheres.size() > fewBodies) {
+        const UniformGrid<S>& grid = use<GridPairs<S>>().build(spheres, margin);
         if (grid.crowding() <= crowded) {
-          use<GridPairs<S>>().search(spheres_, margin, domain, time, out);
+          use<GridPairs<S>>().search(spheres, margin, domain, time, out);
         } else {
-          use<KDTreePairs<S>>().findPairs(spheres_, margin, domain, time, out);
+          use<KDTreePairs<S>>().findPairs(spheres, margin, domain, time, out);
         }
         return;
       }
@@ -76,7 +77,7 @@ class BroadPhase {
         use<AllPairs<S>>();
       }
     }
-    std::visit([&](auto& method) { method.findPairs(spheres_, margin, domain, time, out); }, method_);
+    std::visit([&](auto& method) { method.findPairs(spheres, margin, domain, time, out); }, method_);
   }
 
  private:
@@ -94,7 +95,6 @@ class BroadPhase {
 
   BroadPhaseKind kind_;
   typename detail::BroadPhaseMethods<S>::Variant method_;
-  std::vector<detail::Sphere<S>> spheres_;
 };
 
 }  // namespace gravel

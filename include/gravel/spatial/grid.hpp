@@ -167,8 +167,8 @@ class UniformGrid {
   }
 
   std::vector<Entry> entries_;
-  std::vector<std::size_t> start_;   ///< first entry of each cell, and the end
-  std::vector<std::size_t> cellOf_;  ///< of each point, while building
+  std::vector<std::uint32_t> start_;  ///< first entry of each cell, and the end
+  std::vector<std::size_t> cellOf_;   ///< of each point, while building
   Vector3<S> low_ = Vector3<S>::Zero();
   S cell_ = S(1);
   std::size_t count_[3] = {0, 0, 0};
