@@ -4,6 +4,7 @@
 /// The container of bodies: a storage, stable ids, and the checks at the door.
 
 #include <gravel/bodies/columns.hpp>
+#include <gravel/bodies/places_by_id.hpp>
 #include <gravel/bodies/proxy.hpp>
 #include <gravel/core/parallel.hpp>
 
@@ -11,7 +12,7 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <unordered_map>
+#include <utility>
 #include <vector>
 
 namespace gravel {
@@ -101,9 +102,7 @@ class Bodies {
     try {
       storage_.at(fields::Id{}, i) = key;
       (*this)[i].store(body);
-      if (key != i) {
-        elsewhere_.emplace(key, i);
-      }
+      places_.put(key, i);
     } catch (...) {
       storage_.resize(i);
       throw;
@@ -123,12 +122,12 @@ class Bodies {
   /// field. The own storage stays the same object: a user's arrays are written to.
   template <class Other>
   void assign(const Bodies<Scalar, Other>& other) {
-    auto elsewhere = indicesElsewhere(other.size(), [&](std::size_t i) { return toInteger(other[i].id()); });
+    detail::PlacesById places(other.size(), [&](std::size_t i) { return toInteger(other[i].id()); });
     storage_.resize(other.size());
     for (std::size_t i = 0; i < size(); ++i) {
       detail::copyBody(storage_, i, other.storage(), i);
     }
-    elsewhere_.swap(elsewhere);
+    std::swap(places_, places);
     nextId_ = toInteger(other.nextId());
     ++revision_;
   }
@@ -138,12 +137,7 @@ class Bodies {
     const std::size_t i = indexOf(id);
     const std::size_t last = size() - 1;
     if (i != last) {
-      const std::uint64_t moved = storage_.at(fields::Id{}, last);
-      if (moved == i) {
-        elsewhere_.erase(moved);
-      } else {
-        elsewhere_[moved] = i;  // may throw: nothing has moved yet
-      }
+      places_.put(storage_.at(fields::Id{}, last), i);  // may throw: nothing has moved yet
       if constexpr (requires { storage_.swap(i, last); }) {
         storage_.swap(i, last);
       } else {
@@ -151,17 +145,12 @@ class Bodies {
       }
     }
     storage_.resize(last);
-    elsewhere_.erase(toInteger(id));
+    places_.forget(toInteger(id));
     ++revision_;
   }
 
   std::optional<std::size_t> find(BodyId id) const {
-    const std::uint64_t key = toInteger(id);
-    if (key < size() && storage_.at(fields::Id{}, static_cast<std::size_t>(key)) == key) {
-      return static_cast<std::size_t>(key);
-    }
-    const auto entry = elsewhere_.find(key);
-    return entry == elsewhere_.end() ? std::nullopt : std::optional<std::size_t>(entry->second);
+    return places_.find(toInteger(id), size(), [&](std::size_t i) { return storage_.at(fields::Id{}, i); });
   }
 
   /// \throws std::out_of_range for an unknown id
@@ -185,10 +174,9 @@ class Bodies {
       }
       seen[from] = true;
     }
-    auto elsewhere =
-        indicesElsewhere(size(), [&](std::size_t i) { return storage_.at(fields::Id{}, order[i]); });
+    detail::PlacesById places(size(), [&](std::size_t i) { return storage_.at(fields::Id{}, order[i]); });
     detail::permute(storage_, order);
-    elsewhere_.swap(elsewhere);
+    std::swap(places_, places);
     ++revision_;
   }
 
@@ -231,21 +219,6 @@ class Bodies {
   auto flags() const { return Column<const Storage, fields::Flags>(storage_); }
 
  private:
-  using Indices = std::unordered_map<std::uint64_t, std::size_t>;
-
-  /// Of those among `count` bodies whose id is not their index.
-  template <class IdAt>
-  static Indices indicesElsewhere(std::size_t count, IdAt&& idAt) {
-    Indices indices;
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::uint64_t id = idAt(i);
-      if (id != i) {
-        indices.emplace(id, i);
-      }
-    }
-    return indices;
-  }
-
   void validateOne(std::size_t i) const {
     const auto body = (*this)[i];
     const Scalar m = body.mass();
@@ -311,7 +284,7 @@ class Bodies {
   }
 
   Storage storage_;
-  Indices elsewhere_;  ///< of bodies whose id is not their index; few, until some are removed or reordered
+  detail::PlacesById places_;
   std::uint64_t nextId_ = 0;
   std::uint64_t revision_ = 0;
 };
