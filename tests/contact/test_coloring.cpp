@@ -196,3 +196,81 @@ TEST_CASE("all contacts of a fixed body with single grains are one group") {
   CHECK(coloring.loneCount() == 200);
   CHECK(coloring.colours() == 0);
 }
+
+// Seen to fail: parts that write from the places of the first; parts in the other order.
+TEST_CASE("colours, and the order within one, are those of one walk along a list of many parts") {
+  constexpr std::uint32_t n = 12000;
+  Bodies<double, SoA> bodies;
+  for (std::uint32_t i = 0; i < n; ++i) {
+    Body<double> body;
+    body.radius = 1;
+    body.fixed = i % 50 == 3;
+    bodies.add(body);
+  }
+  const CounterRandom random(5);
+  std::set<std::pair<std::uint32_t, std::uint32_t>> pairs;
+  for (std::uint64_t k = 0; k < 40000; ++k) {
+    // Some with many partners, for the overflow; the last ones lone.
+    const auto i = static_cast<std::uint32_t>(random.uniform(2 * k, 0, k % 40 == 0 ? 5 : 0.9 * n));
+    const auto j = static_cast<std::uint32_t>(random.uniform(2 * k + 1, 0, 0.9 * n));
+    if (i != j) {
+      pairs.insert(std::minmax(i, j));
+    }
+  }
+  for (std::uint32_t i = static_cast<std::uint32_t>(0.9 * n) + 1; i + 1 < n; i += 2) {
+    pairs.insert({i, i + 1});
+  }
+  std::vector<Contact<double>> contacts;
+  for (const auto& [i, j] : pairs) {
+    contacts.push_back({i, j, i, j, {1, 0, 0}, -1.0, 1.0, 1.0});
+  }
+  std::vector<std::set<std::size_t>> taken(n);
+  std::vector<int> partners(n, 0);
+  const auto moves = [&](std::uint32_t i) { return !bodies[i].isFixed(); };
+  for (const Contact<double>& c : contacts) {
+    partners[c.first] += moves(c.first) ? 1 : 0;
+    partners[c.second] += moves(c.second) ? 1 : 0;
+  }
+  std::vector<std::vector<std::uint32_t>> groups(2 + ContactColoring::maxColours);  // lone, colours, overflow
+  for (std::uint32_t k = 0; k < contacts.size(); ++k) {
+    const auto [i, j] = std::pair(contacts[k].first, contacts[k].second);
+    std::size_t colour = 0;
+    if (partners[i] > 1 || partners[j] > 1) {
+      while (colour < ContactColoring::maxColours &&
+             (taken[i].contains(colour) || taken[j].contains(colour))) {
+        ++colour;
+      }
+      for (const std::uint32_t body : {i, j}) {
+        if (moves(body)) {
+          taken[body].insert(colour);
+        }
+      }
+      ++colour;
+    }
+    groups[colour].push_back(k);
+  }
+  REQUIRE(groups.front().size() > 500);
+  REQUIRE(groups.back().size() > 100);
+  const int before = omp_get_max_threads();
+  for (const int threads : {1, 3}) {
+    omp_set_num_threads(threads);
+    ContactColoring coloring;
+    coloring.build(std::span<const Contact<double>>(contacts), bodies);
+    std::size_t place = 0;
+    bool same = true;
+    for (const auto& group : groups) {
+      for (const std::uint32_t k : group) {
+        same = same && coloring.rows()[place++].contact == k;
+      }
+    }
+    CHECK(same);
+    CHECK(coloring.loneCount() == groups.front().size());
+    CHECK(coloring.begin(coloring.colours()) == contacts.size() - groups.back().size());
+    for (const ContactColoring::Row& row : coloring.rows()) {
+      const ContactColoring::Row& other = coloring.rowsByContact()[row.contact];
+      same = same && other.slot1 == row.slot1 && other.slot2 == row.slot2 && other.contact == row.contact;
+    }
+    CHECK(same);
+  }
+  omp_set_num_threads(before);
+}

@@ -5,11 +5,14 @@
 
 #include <gravel/contact/contact_facts.hpp>
 #include <gravel/core/check.hpp>
+#include <gravel/core/memory.hpp>
 #include <gravel/core/parallel.hpp>
 
+#include <array>
 #include <bit>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace gravel {
@@ -34,15 +37,18 @@ class ContactColoring {
   /// \throws std::invalid_argument for a contact of a body that is not there, or of a body with itself
   template <Real S, ContactBodies B>
   void build(std::span<const Contact<S>> contacts, const B& bodies) {
-    number(contacts, bodies);
-    choose(contacts.size());
-    arrange(contacts.size());
+    takeEnds(contacts, bodies.size());
+    number(bodies);
+    choose();
+    arrange();
   }
 
   /// Rows in the order of solving: lone ones, colour 0, 1, …, overflow.
   std::span<const Row> rows() const { return rows_; }
   std::size_t loneCount() const { return start_.front(); }
   std::size_t colours() const { return start_.size() - 2; }
+  /// The same rows in the order of contacts.
+  std::span<const Row> rowsByContact() const { return byContact_; }
   /// Rows [begin, end) of a colour; the colour `colours()` is the overflow.
   std::size_t begin(std::size_t colour) const { return start_[colour]; }
   std::size_t end(std::size_t colour) const { return start_[colour + 1]; }
@@ -62,51 +68,57 @@ class ContactColoring {
   static constexpr std::uint8_t overflow = maxColours;
   static constexpr std::uint8_t lone = maxColours + 1;
 
-  template <Real S, ContactBodies B>
-  void number(std::span<const Contact<S>> contacts, const B& bodies) {
+  static constexpr std::size_t chunk = 8192;
+
+  /// Bodies in place of slots.
+  template <Real S>
+  void takeEnds(std::span<const Contact<S>> contacts, std::size_t bodies) {
     if (contacts.size() >= none) {
       detail::refuse("number of contacts", std::to_string(contacts.size()), "below 2^32 - 1");
     }
-    for (const Contact<S>& c : contacts) {
-      detail::requireBodies(c, bodies.size());
-    }
+    detail::resizeSparingly(byContact_, contacts.size());
+    parallelFor(contacts.size(), chunk, [&](std::size_t k) {
+      detail::requireBodies(contacts[k], bodies);
+      byContact_[k] = {static_cast<std::uint32_t>(k), contacts[k].first, contacts[k].second};
+    });
+  }
+
+  /// In one pass: a slot is new where its body appears first.
+  template <ContactBodies B>
+  void number(const B& bodies) {
     for (const std::uint32_t body : bodyOfSlot_) {
       slotOfBody_[body] = none;
     }
     slotOfBody_.resize(std::max(slotOfBody_.size(), bodies.size()), none);
     bodyOfSlot_.clear();
     movable_.clear();
-    unsorted_.clear();
+    degree_.clear();
     const auto slot = [&](std::uint32_t body) {
       std::uint32_t& s = slotOfBody_[body];
       if (s == none) {
         s = static_cast<std::uint32_t>(bodyOfSlot_.size());
         bodyOfSlot_.push_back(body);
         movable_.push_back(detail::isMovable(bodies, body) ? 1 : 0);
+        degree_.push_back(0);
       }
+      degree_[s] += movable_[s];
       return s;
     };
-    for (std::uint32_t k = 0; k < contacts.size(); ++k) {
-      const std::uint32_t slot1 = slot(contacts[k].first);
-      unsorted_.push_back({k, slot1, contacts[k].second == staticPartner ? none : slot(contacts[k].second)});
-    }
-    for (Row& row : unsorted_) {
-      row.slot2 = row.slot2 == none ? staticSlot() : row.slot2;
+    for (Row& row : byContact_) {
+      row.slot1 = slot(row.slot1);
+      row.slot2 = row.slot2 == staticPartner ? none : slot(row.slot2);
     }
     movable_.push_back(0);
+    degree_.push_back(0);
   }
 
-  void choose(std::size_t n) {
+  void choose() {
     constexpr std::uint64_t all = (std::uint64_t{1} << maxColours) - 1;
     used_.assign(movable_.size(), 0);
-    degree_.assign(movable_.size(), 0);
-    for (const Row& row : unsorted_) {
-      degree_[row.slot1] += movable_[row.slot1];
-      degree_[row.slot2] += movable_[row.slot2];
-    }
-    colour_.resize(n);
-    for (std::size_t k = 0; k < n; ++k) {
-      const Row& row = unsorted_[k];
+    detail::resizeSparingly(colour_, byContact_.size());
+    for (std::size_t k = 0; k < byContact_.size(); ++k) {
+      Row& row = byContact_[k];
+      row.slot2 = row.slot2 == none ? staticSlot() : row.slot2;
       if (degree_[row.slot1] <= 1 && degree_[row.slot2] <= 1) {
         colour_[k] = lone;
         continue;
@@ -124,29 +136,45 @@ class ContactColoring {
     }
   }
 
-  void arrange(std::size_t n) {
-    std::size_t count[maxColours + 2] = {};
-    for (std::size_t k = 0; k < n; ++k) {
-      ++count[colour_[k]];
+  /// By colour, within one in the order of contacts: first how many there are in each part of the list, then
+  /// each part finds its places.
+  void arrange() {
+    const std::size_t n = byContact_.size();
+    places_.assign(n / chunk + 1, Places{});
+    parallelForChunks<Share::Alike>(n, chunk, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t k = begin; k < end; ++k) {
+        ++places_[begin / chunk][colour_[k]];
+      }
+    });
+    std::size_t next = 0;
+    const auto place = [&](std::uint8_t colour) {
+      for (Places& part : places_) {
+        next += std::exchange(part[colour], next);
+      }
+    };
+    place(lone);
+    start_.assign(1, next);
+    for (std::uint8_t c = 0; c < maxColours; ++c) {
+      place(c);
+      if (next == start_.back()) {
+        break;  // greedy colours leave no gaps
+      }
+      start_.push_back(next);
     }
-    std::size_t next[maxColours + 2] = {};
-    std::size_t place = count[lone];
-    start_.assign(1, place);
-    for (std::size_t c = 0; c < maxColours && count[c] > 0; ++c) {  // greedy colours leave no gaps
-      next[c] = place;
-      place += count[c];
-      start_.push_back(place);
-    }
-    next[overflow] = place;
+    place(overflow);
     start_.push_back(n);
-    rows_.resize(n);
-    for (std::size_t k = 0; k < n; ++k) {
-      rows_[next[colour_[k]]++] = unsorted_[k];
-    }
+    detail::resizeSparingly(rows_, n);
+    parallelForChunks<Share::Alike>(n, chunk, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t k = begin; k < end; ++k) {
+        rows_[places_[begin / chunk][colour_[k]]++] = byContact_[k];
+      }
+    });
   }
 
   std::vector<Row> rows_;
-  std::vector<Row> unsorted_;
+  std::vector<Row> byContact_;
+  using Places = std::array<std::size_t, maxColours + 2>;
+  std::vector<Places> places_;  ///< by part of the list
   std::vector<std::size_t> start_{0, 0};
   std::vector<std::uint32_t> bodyOfSlot_;
   std::vector<std::uint32_t> slotOfBody_;

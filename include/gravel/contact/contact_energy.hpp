@@ -29,7 +29,7 @@ class ContactEnergy {
   /// order of rows. O(contacts). \param others the rows are not those of the last call
   void settle(ContactProblem<S>& problem, const ContactColoring& colouring, const ContactView<S>& contacts,
               bool others, ContactReport<S>& report, detail::ImpulseList<S>& impulses) {
-    terms_.resize(problem.rows.size());
+    detail::resizeAnew(terms_, problem.rows.size());
     known_ = known_ && !others;
     impulses.resize(problem.rows.size(), !problem.turning.empty());
     const std::size_t kept = problem.kept ? colouring.loneCount() : problem.rows.size();
@@ -85,7 +85,7 @@ class ContactEnergy {
 
   /// The means of the bodies' velocities before and after.
   void findMeans(const ContactProblem<S>& problem) {
-    means_.resize(problem.bodies.size());
+    detail::resizeAnew(means_, problem.bodies.size());
     parallelFor(means_.size(), chunk, [&](std::size_t slot) {
       const auto& before = problem.initial[slot];
       Body& mean = means_[slot];
@@ -214,7 +214,7 @@ class ContactEnergy {
   void findIslands(const ContactColoring& colouring) {
     islandOfSlot_.resize(colouring.bodies().size() + 1);
     std::iota(islandOfSlot_.begin(), islandOfSlot_.end(), 0U);
-    for (const ContactColoring::Row& row : colouring.rows()) {
+    for (const ContactColoring::Row& row : colouring.rowsByContact()) {  // neighbours in memory too
       if (colouring.movable(row.slot1) && colouring.movable(row.slot2)) {
         join(row.slot1, row.slot2);
       }
@@ -222,7 +222,7 @@ class ContactEnergy {
     for (std::uint32_t& parent : islandOfSlot_) {  // a parent comes before its children
       parent = islandOfSlot_[parent];
     }
-    islandOfRow_.resize(colouring.rows().size());
+    detail::resizeAnew(islandOfRow_, colouring.rows().size());
     parallelFor(islandOfRow_.size(), chunk, [&](std::size_t k) {
       const ContactColoring::Row& row = colouring.rows()[k];
       islandOfRow_[k] = islandOfSlot_[colouring.movable(row.slot1) ? row.slot1 : row.slot2];
@@ -260,6 +260,9 @@ class ContactEnergy {
   }
 
   void join(std::uint32_t i, std::uint32_t j) {
+    if (islandOfSlot_[i] == islandOfSlot_[j]) {
+      return;
+    }
     i = rootOf(i);
     j = rootOf(j);
     islandOfSlot_[std::max(i, j)] =

@@ -159,7 +159,7 @@ class ContactSolver {
   template <class Change>
   Eigen::Array<S, 2, 1> workOn(Change&& dv) {
     using Sums = Eigen::Array<S, 2, 1>;
-    changes_.resize(coloring_.bodies().size() + 1);
+    detail::resizeAnew(changes_, coloring_.bodies().size() + 1);
     changes_.back() = Vector3<S>::Zero();
     parallelFor(coloring_.bodies().size(), chunk,
                 [&](std::size_t slot) { changes_[slot] = dv(coloring_.bodies()[slot]); });

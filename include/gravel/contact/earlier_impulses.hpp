@@ -15,7 +15,7 @@ namespace gravel::detail {
 
 /// By contact, its row.
 inline void findRows(std::span<const ContactColoring::Row> rows, std::vector<std::uint32_t>& rowOf) {
-  rowOf.resize(rows.size());
+  resizeAnew(rowOf, rows.size());
   parallelFor(rows.size(), 512,
               [&](std::size_t r) { rowOf[rows[r].contact] = static_cast<std::uint32_t>(r); });
 }
@@ -46,8 +46,8 @@ class EarlierImpulses {
   /// \param contacts sorted by keys, whose names go to `names`, impulses in the order of `rows` to `impulses`
   void handOn(std::span<const Contact<S>> contacts, std::span<const ContactColoring::Row> rows,
               std::vector<ContactName>& names, ImpulseList<S>& impulses) {
-    names.resize(contacts.size());
-    origins_.resize(contacts.size());
+    resizeAnew(names, contacts.size());
+    resizeAnew(origins_, contacts.size());
     parallelForChunks<Share::Alike>(contacts.size(), chunk, [&](std::size_t begin, std::size_t end) {
       const auto earlier = [](const ContactName& name, const ContactKeys& keys) { return name.keys < keys; };
       auto old =

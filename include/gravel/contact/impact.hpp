@@ -63,22 +63,6 @@ struct ImpactReport {
   Scalar driftWork = Scalar(0);
 };
 
-namespace detail {
-
-/// v.clear() that gives back room of which the last use filled less than a quarter: a heap that fell has
-/// blows by the thousand in a step, and none once it rests.
-template <class T>
-void clearSpare(std::vector<T>& v) {
-  constexpr std::size_t harmless = 1024;
-  if (v.capacity() > 4 * v.size() + harmless) {
-    std::vector<T>().swap(v);
-  } else {
-    v.clear();
-  }
-}
-
-}  // namespace detail
-
 /// Nobody else decides what an impact does.
 struct NoDecision {};
 

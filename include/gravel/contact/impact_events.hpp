@@ -11,6 +11,7 @@
 
 #include <gravel/contact/collision_outcome.hpp>
 #include <gravel/contact/impact_forecast.hpp>
+#include <gravel/core/memory.hpp>
 
 namespace gravel {
 

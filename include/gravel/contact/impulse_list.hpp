@@ -4,6 +4,7 @@
 /// The impulses of many contacts, in little room.
 
 #include <gravel/contact/contact_settings.hpp>
+#include <gravel/core/memory.hpp>
 #include <gravel/core/parallel.hpp>
 
 #include <cstdint>
@@ -20,9 +21,9 @@ class ImpulseList {
 
   /// As many, of any value. \param turns whether any of them resists rolling or spinning
   void resize(std::size_t count, bool turns) {
-    pushes_.resize(count);
-    impacts_.resize(count);
-    turning_.resize(turns ? count : 0);
+    resizeSparingly(pushes_, count);
+    resizeSparingly(impacts_, count);
+    resizeSparingly(turning_, turns ? count : 0);
   }
 
   /// As many, all zero.

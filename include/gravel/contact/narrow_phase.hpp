@@ -80,7 +80,7 @@ class NarrowPhase {
       starts_.push_back(next);
     }
     const Start last = starts_.back();
-    out.contacts.resize(last.place + boundaryContacts.size() - last.wall);
+    detail::resizeAnew(out.contacts, last.place + boundaryContacts.size() - last.wall);
     out.surfaces.clear();
     for (const Material<S>& material : materials) {
       out.surfaces.push_back({material});

@@ -3,6 +3,7 @@
 /// \file
 /// Which contacts a sweep may pass over.
 
+#include <gravel/core/memory.hpp>
 #include <gravel/core/types.hpp>
 
 #include <cstdint>
@@ -21,7 +22,7 @@ class RowWatch {
   void begin(std::size_t slots, std::size_t rows, const S& still) {
     still_ = still;
     ways_.assign(slots, S(0));
-    then_.resize(rows);
+    resizeSparingly(then_, rows);
     holds_ = false;
   }
   /// Goes on with other rows being right enough.

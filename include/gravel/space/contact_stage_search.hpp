@@ -198,7 +198,7 @@ std::span<const ContactName> ContactStage<Scalar, Layout>::names() {
   if (coloured_) {
     return solver_.names();
   }
-  names_.resize(contacts_.size());
+  detail::resizeAnew(names_, contacts_.size());
   parallelFor(contacts_.size(), 4096, [&](std::size_t k) { names_[k] = ContactName::of(contacts_[k]); });
   return names_;
 }

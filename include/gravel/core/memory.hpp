@@ -1,0 +1,42 @@
+#pragma once
+
+/// \file
+/// Workspaces that are kept from step to step, without much room to spare.
+
+#include <cstddef>
+#include <vector>
+
+namespace gravel::detail {
+
+/// v.resize(n) that leaves room for an eighth more where it has to grow, not for as many again: lists by
+/// contact are the most of a heap's memory, and their length hardly changes.
+template <class T>
+void resizeSparingly(std::vector<T>& v, std::size_t n) {
+  if (n > v.capacity()) {
+    v.reserve(n + n / 8);
+  }
+  v.resize(n);
+}
+
+/// The same for values that are of no use any more: they are not moved to where there is room.
+template <class T>
+void resizeAnew(std::vector<T>& v, std::size_t n) {
+  if (n > v.capacity()) {
+    std::vector<T>().swap(v);
+  }
+  resizeSparingly(v, n);
+}
+
+/// v.clear() that gives back room of which the last use filled less than a quarter: a heap that fell has
+/// blows by the thousand in a step, and none once it rests.
+template <class T>
+void clearSpare(std::vector<T>& v) {
+  constexpr std::size_t harmless = 1024;
+  if (v.capacity() > 4 * v.size() + harmless) {
+    std::vector<T>().swap(v);
+  } else {
+    v.clear();
+  }
+}
+
+}  // namespace gravel::detail
