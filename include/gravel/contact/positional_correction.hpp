@@ -9,6 +9,8 @@
 #include <gravel/contact/solver_rows.hpp>
 #include <gravel/core/parallel.hpp>
 
+#include <numeric>
+
 namespace gravel {
 
 template <Real Scalar>
@@ -21,7 +23,7 @@ struct CorrectionSettings {
   Scalar tolerance =
       Scalar(1e-3);  ///< [1] > 0: sweeps end when the largest move is this times the largest overlap
   /// [1] >= 0: overlaps that are right to this times the smallest radius of a contact are right; nothing is
-  /// moved while all are, and where some are not, those below a 16th of it stay unless others are pressed
+  /// moved while all are, and where some are not, those below a quarter of it stay unless others are pressed
   /// into them.
   Scalar precision = Scalar(1e-4);
   int maxIterations = 20;  ///< >= 1
@@ -74,11 +76,9 @@ class PositionalCorrection {
     takeUp(colouring, bodies);
     const S enough = std::max<S>(settings.tolerance * facts.overlap, right);
     watch_.begin(shifts_.size(), contacts.size(), S(enough / S(2)));
-    rows_.resize(contacts.size());
-    filled_.assign(contacts.size(), 0);
-    deep_.resize(contacts.size());
+    detail::resizeAnew(deep_, contacts.size());
     parallelFor(contacts.size(), chunk,
-                [&](std::size_t c) { deep_[c] = -contacts[c].gap > right / S(16) ? 1 : 0; });
+                [&](std::size_t c) { deep_[c] = -contacts[c].gap > right / S(4) ? 1 : 0; });
     parallelFor(contacts.size(), chunk,
                 [&](std::size_t k) { watch_.enterFirst(k, deep_[colouring.rows()[k].contact] == 0); });
     do {
@@ -88,11 +88,8 @@ class PositionalCorrection {
         if (!watch_.isStale(k, place.slot1, place.slot2)) {
           return;
         }
-        if (filled_[k] == 0) {
-          filled_[k] = 1;
-          fill(rows_[k], contacts[place.contact], place, bodies, settings);
-        }
-        open(rows_[k], place, settings.keepAngularMomentum, sum);
+        open(rowOf(contacts[place.contact], place, bodies, settings), place, settings.keepAngularMomentum,
+             sum);
         watch_.enter(k, place.slot1, place.slot2);
       };
       Opened opened = detail::sumOverRows(0, colouring.loneCount(), Opened{}, one);
@@ -101,19 +98,7 @@ class PositionalCorrection {
       report.loss += opened.loss;
       ++report.iterations;
     } while (report.residual > enough && report.iterations < settings.maxIterations);
-    auto&& positions = bodies.positions();
-    auto&& velocities = bodies.velocities();
-    for (std::uint32_t slot = 0; slot < colouring.bodies().size(); ++slot) {
-      const Vector3<S>& shift = shifts_[slot].d;
-      if (shift != Vector3<S>::Zero()) {
-        const std::uint32_t i = colouring.bodies()[slot];
-        positions[i] += shift;
-        moved_.push_back({i, shift});
-        if (shifts_[slot].dv != Vector3<S>::Zero()) {
-          velocities[i] += shifts_[slot].dv;
-        }
-      }
-    }
+    move(colouring, bodies);
     return report;
   }
 
@@ -160,8 +145,39 @@ class PositionalCorrection {
     });
   }
 
+  /// Of each part of the slots first how many moved, and so where they stand in the list.
   template <class B>
-  void fill(Row& row, const Contact<S>& c, const ContactColoring::Row& place, const B& bodies,
+  void move(const ContactColoring& colouring, B& bodies) {
+    auto&& positions = bodies.positions();
+    auto&& velocities = bodies.velocities();
+    const std::size_t n = colouring.bodies().size();
+    const auto hasMoved = [&](std::size_t slot) { return shifts_[slot].d != Vector3<S>::Zero(); };
+    ends_.assign(n / chunk + 1, 0);
+    parallelForChunks<Share::Alike>(n, chunk, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t slot = begin; slot < end; ++slot) {
+        ends_[begin / chunk] += hasMoved(slot) ? 1U : 0U;
+      }
+    });
+    std::partial_sum(ends_.begin(), ends_.end(), ends_.begin());
+    detail::resizeAnew(moved_, ends_.back());
+    parallelForChunks<Share::Alike>(n, chunk, [&](std::size_t begin, std::size_t end) {
+      std::size_t place = begin == 0 ? 0 : ends_[begin / chunk - 1];
+      for (std::size_t slot = begin; slot < end; ++slot) {
+        if (hasMoved(slot)) {
+          const std::uint32_t i = colouring.bodies()[slot];
+          positions[i] += shifts_[slot].d;
+          moved_[place++] = {i, shifts_[slot].d};
+          if (shifts_[slot].dv != Vector3<S>::Zero()) {
+            velocities[i] += shifts_[slot].dv;
+          }
+        }
+      }
+    });
+  }
+
+  /// Made where it is needed: most contacts are never opened, or once.
+  template <class B>
+  Row rowOf(const Contact<S>& c, const ContactColoring::Row& place, const B& bodies,
             const CorrectionSettings<S>& settings) const {
     const S overlap = -c.gap;
     const S kept =
@@ -172,7 +188,7 @@ class PositionalCorrection {
     const MassShares<S> shares = massShares<S>(m1, m1 > S(0), m2, m2 > S(0));
     const bool boundary = c.second == staticPartner;
     const S distance = boundary ? S(0) : c.arm1 + c.arm2;
-    row = {c.normal, boundary ? S(-1) : distance, S(distance - c.gap - kept), shares.first, shares.second};
+    return {c.normal, boundary ? S(-1) : distance, S(distance - c.gap - kept), shares.first, shares.second};
   }
 
   [[gnu::flatten]] void open(const Row& row, const ContactColoring::Row& place, bool keepAngularMomentum,
@@ -222,8 +238,7 @@ class PositionalCorrection {
   std::vector<Shift> shifts_;
   detail::RowWatch<S> watch_;
   std::vector<std::uint8_t> deep_;  ///< by contact: more than hardly any overlap
-  std::vector<Row> rows_;           ///< those that are `filled_`
-  std::vector<std::uint8_t> filled_;
+  std::vector<std::size_t> ends_;   ///< by part of the slots, in the list of those moved
   std::vector<Displacement<S>> moved_;
 };
 

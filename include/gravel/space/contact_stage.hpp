@@ -112,13 +112,19 @@ class ContactStage {
     Scalar work = separationLoss_;
     if (moved_) {
       const HillFrame<Scalar> frame(domain);
-      for (const Displacement<Scalar>& d : solver_.displacements()) {
-        work += force.conservativeForce(bodies, d.body).dot(d.shift);
-        if (frame.turns()) {
-          const Vector3<Scalar> x = bodies[d.body].position();
-          work += Scalar(bodies[d.body].mass()) * (frame.potential(x - d.shift) - frame.potential(x));
+      const std::vector<Displacement<Scalar>>& all = solver_.displacements();
+      work += orderedSum(all.size(), 512, Scalar(0), [&](std::size_t begin, std::size_t end) {
+        Scalar sum(0);
+        for (std::size_t k = begin; k < end; ++k) {
+          const Displacement<Scalar>& d = all[k];
+          sum += force.conservativeForce(bodies, d.body).dot(d.shift);
+          if (frame.turns()) {
+            const Vector3<Scalar> x = bodies[d.body].position();
+            sum += Scalar(bodies[d.body].mass()) * (frame.potential(x - d.shift) - frame.potential(x));
+          }
         }
-      }
+        return sum;
+      });
     }
     return work;
   }
