@@ -68,12 +68,12 @@ class ContactProblem : public detail::ProblemBodies<S> {
     last_ = &last;
     ratio_ = ratio;
     kept = false;
-    rows.resize(contacts.size());
-    gaps_.resize(contacts.size());
-    turning.resize(kinds.turn ? contacts.size() : 0);
+    detail::resizeSparingly(rows, contacts.size());
+    detail::resizeSparingly(gaps_, contacts.size());
+    detail::resizeSparingly(turning, kinds.turn ? contacts.size() : 0);
     slipTargets.assign(friction && (kinds.drift || kinds.spring) ? rows.size() : 0, Vector3<S>::Zero());
-    rests_.resize(contacts.size());
-    approaches_.resize(contacts.size());
+    detail::resizeSparingly(rests_, contacts.size());
+    detail::resizeSparingly(approaches_, contacts.size());
     passes = again && watch.holds() && sameScales_ && ratio == S(1) && turning.empty() &&
              slipTargets.empty() && !drifting && settings.restitutionThreshold == threshold_;
     threshold_ = settings.restitutionThreshold;
@@ -82,12 +82,12 @@ class ContactProblem : public detail::ProblemBodies<S> {
       const Contact<S>& contact = contacts[place.contact];
       if (fresh) {
         const Material<S>& material = contacts.material(contact);
-        fill(rows[k], contact, material, place, source);
+        fill(rows[k], contact, material, place);
         gaps_[k] = detail::RestingGap<S>::of(contact);
         if (!turning.empty()) {
-          const S r2 = contact.second == staticPartner ? S(0) : S(source.radii()[contact.second]);
-          turning[k] = detail::turningRow<S>(material, source.radii()[contact.first], r2,
-                                             bodies[place.slot1].spin, bodies[place.slot2].spin);
+          turning[k] =
+              detail::turningRow<S>(material, initial[place.slot1].radius, initial[place.slot2].radius,
+                                    bodies[place.slot1].spin, bodies[place.slot2].spin);
         }
       }
     };
@@ -196,9 +196,8 @@ class ContactProblem : public detail::ProblemBodies<S> {
   };
 
   /// What stays while bodies and surfaces stay.
-  template <class B>
-  void fill(Row& row, const Contact<S>& c, const Material<S>& material, const ContactColoring::Row& place,
-            const B& source) const {
+  void fill(Row& row, const Contact<S>& c, const Material<S>& material,
+            const ContactColoring::Row& place) const {
     const Body& b1 = bodies[place.slot1];
     const Body& b2 = bodies[place.slot2];
     row.n = c.normal;
@@ -206,8 +205,8 @@ class ContactProblem : public detail::ProblemBodies<S> {
     row.slot2 = place.slot2;
     row.contact = place.contact;
     row.impact = false;
-    row.c1 = ratio(c.arm1, source.radii()[c.first]);
-    row.c2 = c.second == staticPartner ? S(0) : ratio(c.arm2, source.radii()[c.second]);
+    row.c1 = ratio(c.arm1, initial[place.slot1].radius);
+    row.c2 = ratio(c.arm2, initial[place.slot2].radius);
     row.normalMass = detail::reciprocal<S>(b1.inverseMass + b2.inverseMass);
     const S mobility =
         b1.inverseMass + b2.inverseMass + row.c1 * row.c1 * b1.spin + row.c2 * row.c2 * b2.spin;

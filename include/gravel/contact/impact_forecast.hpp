@@ -89,6 +89,10 @@ class ImpactForecast {
     bool placed = false;
     Vector3<S> drift;
     for (const auto& [i, j] : pairs) {
+      if (next != scene.held.end() && next->first == i && next->second == j) {
+        ++next;  // most pairs of a heap: both lists are in one order
+        continue;
+      }
       if (!swept_.mayMeet(i, j, scene.domain, scene.settings.time, scene.settings.h, drift)) {
         continue;
       }
@@ -100,7 +104,11 @@ class ImpactForecast {
       while (next != scene.held.end() && next->keys < keys) {
         ++next;
       }
-      if ((next != scene.held.end() && next->keys == keys) || !detail::canTouch(scene.bodies, i, j)) {
+      if (next != scene.held.end() && next->keys == keys) {
+        ++next;
+        continue;
+      }
+      if (!detail::canTouch(scene.bodies, i, j)) {
         continue;
       }
       const S reach = S(scene.bodies.radii()[i]) + S(scene.bodies.radii()[j]);

@@ -63,9 +63,9 @@ class ProblemBodies {
   template <class B>
   void gatherBodies(const B& source, const ContactColoring& colouring, const S& ratio) {
     const std::size_t n = colouring.bodies().size();
-    bodies.resize(n + 1);
-    initial.resize(n + 1);
-    accelerations_.resize(n + 1);
+    resizeSparingly(bodies, n + 1);
+    resizeSparingly(initial, n + 1);
+    resizeSparingly(accelerations_, n + 1);
     watch.setHolds(watch.holds() && again && speedExponent_ == 0);
     // Mostly nothing was to be scaled, and so it goes on: one look at a body is enough.
     const bool plain = speedExponent_ == 0 && massExponent_ == 0;
@@ -115,7 +115,7 @@ class ProblemBodies {
     mostGuess_ =
         tooMuch * scaled<S>(scales.fastest, speedExponent_) * scaled<S>(scales.heaviest, massExponent_);
     accelerations_[n] = initial[n].v = initial[n].s = Vector3<S>::Zero();
-    initial[n].fall = S(0);
+    initial[n].fall = initial[n].radius = S(0);
     bodies[n] = Body{Vector3<S>::Zero(), S(0), Vector3<S>::Zero(), S(0)};
     if (plain && sameScales_ && again == wasAgain) {
       return;
@@ -170,6 +170,7 @@ class ProblemBodies {
     const Vector3<S> a = movable ? Vector3<S>(source.accelerations()[i]) : Vector3<S>(Vector3<S>::Zero());
     accelerations_[slot] = a;
     initial[slot].fall = safeNorm(a);
+    initial[slot].radius = r;
     b.inverseMass = movable ? S(source.masses()[i]) : S(0);
     b.spin = movable && r > S(0) && k > S(0) ? S(1) / k : S(0);
     return b;

@@ -42,6 +42,7 @@ struct alignas(rowAlignment<S>) SolverStart {
   Vector3<S> v;
   S fall;  ///< [m s^-2] its acceleration; 0 of what nothing moves
   Vector3<S> s;
+  S radius;  ///< [m]
 };
 
 /// What the next solve of the same contacts goes on from.
