@@ -5,6 +5,7 @@
 
 #include <gravel/contact/boundary_contacts.hpp>
 #include <gravel/contact/contact_facts.hpp>
+#include <gravel/core/memory.hpp>
 #include <gravel/core/parallel.hpp>
 #include <gravel/spatial/pair.hpp>
 

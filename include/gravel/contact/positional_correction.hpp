@@ -7,6 +7,7 @@
 #include <gravel/contact/contact_facts.hpp>
 #include <gravel/contact/row_watch.hpp>
 #include <gravel/contact/solver_rows.hpp>
+#include <gravel/core/memory.hpp>
 #include <gravel/core/parallel.hpp>
 
 #include <numeric>
