@@ -153,3 +153,27 @@ TEST_CASE("A sliding bounce turns the body from the moment of the impact on") {
   const Eigen::Quaterniond q(space.body(0).orientation());
   CHECK_THAT(2 * std::atan2(q.y(), q.w()), WithinAbs(angle, 1e-15));
 }
+
+TEST_CASE("A ball that rests on another is struck by a bullet all the same, whoever has which id") {
+  const double v = 300;
+  for (const std::array<std::size_t, 3>& order :
+       {std::array<std::size_t, 3>{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}) {
+    CAPTURE(order[0], order[1], order[2]);
+    SimulationConfig<double> config = plain(1e-2);  // three radii a step
+    config.coeffRestitution = 1.0;
+    Space<double> space(config);
+    // Struck, its neighbour along x, and the bullet along y, frictionless: only the first two exchange.
+    const std::array<Body<double>, 3> roles{ball({0, 0, 0}, {0, 0, 0}, 1.0, 1.0),
+                                            ball({2, 0, 0}, {0, 0, 0}, 1.0, 1.0),
+                                            ball({0, -3.5, 0}, {0, v, 0}, 1.0, 1.0)};
+    std::array<BodyId, 3> ids{};
+    for (const std::size_t role : order) {
+      ids[role] = space.addBody(roles[role]);
+    }
+    advance(space, 1);
+    CHECK(space.contactReport().impacts >= 1);
+    CHECK((Vec(space.body(ids[0]).velocity()) - Vec(0, v, 0)).norm() < 1e-12 * v);
+    CHECK((Vec(space.body(ids[1]).velocity()) - Vec(0, 0, 0)).norm() < 1e-12 * v);
+    CHECK(Vec(space.body(ids[2]).velocity()).norm() < 1e-12 * v);
+  }
+}
