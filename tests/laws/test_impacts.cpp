@@ -154,6 +154,7 @@ TEST_CASE("A sliding bounce turns the body from the moment of the impact on") {
   CHECK_THAT(2 * std::atan2(q.y(), q.w()), WithinAbs(angle, 1e-15));
 }
 
+// Seen to fail: a pair passed over where a contact of its first ball comes next in the list of those held.
 TEST_CASE("A ball that rests on another is struck by a bullet all the same, whoever has which id") {
   const double v = 300;
   for (const std::array<std::size_t, 3>& order :
@@ -161,10 +162,11 @@ TEST_CASE("A ball that rests on another is struck by a bullet all the same, whoe
     CAPTURE(order[0], order[1], order[2]);
     SimulationConfig<double> config = plain(1e-2);  // three radii a step
     config.coeffRestitution = 1.0;
+    config.positionalCorrectionFactor = 0;  // moves nobody
     Space<double> space(config);
     // Struck, its neighbour along x, and the bullet along y, frictionless: only the first two exchange.
     const std::array<Body<double>, 3> roles{ball({0, 0, 0}, {0, 0, 0}, 1.0, 1.0),
-                                            ball({2, 0, 0}, {0, 0, 0}, 1.0, 1.0),
+                                            ball({2 - 1e-9, 0, 0}, {0, 0, 0}, 1.0, 1.0),
                                             ball({0, -3.5, 0}, {0, v, 0}, 1.0, 1.0)};
     std::array<BodyId, 3> ids{};
     for (const std::size_t role : order) {
