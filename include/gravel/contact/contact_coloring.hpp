@@ -186,16 +186,14 @@ class ContactColoring {
 
 namespace detail {
 
-/// Calls f(k, sum), which adds to the sum, for rows [begin, end) that share no movable body, shared between
-/// threads where they are many; chunks depend on their number alone.
+/// Calls f(from, to, sum), which adds to the sum, for the parts of rows [begin, end) that share no movable
+/// body, shared between threads where they are many; parts depend on their number alone.
 template <class T, class F>
-T sumOverRows(std::size_t begin, std::size_t end, const T& zero, F&& f) {
+T sumOverParts(std::size_t begin, std::size_t end, const T& zero, F&& f) {
   constexpr std::size_t chunk = 128;  // small beside a colour's part of a thread: all end at once
   const auto run = [&](std::size_t from, std::size_t to) {
     T sum = zero;
-    for (std::size_t k = from; k < to; ++k) {
-      f(k, sum);
-    }
+    f(from, to, sum);
     return sum;
   };
   if (end - begin < 4 * chunk) {  // not worth the threads
@@ -207,16 +205,26 @@ T sumOverRows(std::size_t begin, std::size_t end, const T& zero, F&& f) {
 
 /// The same over all rows but the lone ones, colour after colour, and the overflow one by one.
 template <class T, class F>
-T sumOverColours(const ContactColoring& colouring, const T& zero, F&& f) {
+T sumOverColourParts(const ContactColoring& colouring, const T& zero, F&& f) {
   T sum = zero;
   for (std::size_t c = 0; c < colouring.colours(); ++c) {
-    sum += sumOverRows(colouring.begin(c), colouring.end(c), zero, f);
+    sum += sumOverParts(colouring.begin(c), colouring.end(c), zero, f);
   }
   const std::size_t overflow = colouring.colours();
   for (std::size_t k = colouring.begin(overflow); k < colouring.end(overflow); ++k) {
-    f(k, sum);
+    f(k, k + 1, sum);
   }
   return sum;
+}
+
+/// f(k, sum) for each row of a part.
+template <class F>
+auto eachRow(F&& f) {
+  return [&f](std::size_t begin, std::size_t end, auto& sum) {
+    for (std::size_t k = begin; k < end; ++k) {
+      f(k, sum);
+    }
+  };
 }
 
 }  // namespace detail

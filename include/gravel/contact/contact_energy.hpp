@@ -25,17 +25,18 @@ namespace gravel {
 template <Real S>
 class ContactEnergy {
  public:
-  /// Guards the energy of `problem`, fills in the losses of the report, and takes down the impulses in the
-  /// order of rows. O(contacts). \param others the rows are not those of the last call
+  /// Guards the energy of `problem`, fills in the losses of the report, and completes the list of its
+  /// impulses, in SI units. O(contacts). \param others the rows are not those of the last call
   void settle(ContactProblem<S>& problem, const ContactColoring& colouring, const ContactView<S>& contacts,
-              bool others, ContactReport<S>& report, detail::ImpulseList<S>& impulses) {
+              bool others, ContactReport<S>& report) {
     detail::resizeAnew(terms_, problem.rows.size());
     known_ = known_ && !others;
-    impulses.resize(problem.rows.size(), !problem.turning.empty());
-    const std::size_t kept = problem.kept ? colouring.loneCount() : problem.rows.size();
-    Sums sums = takeDown(problem, contacts, kept, impulses);
+    Sums sums = takeDown(problem, colouring, contacts);
     if (sums[3] > S(0) && guard(problem, colouring, contacts)) {
-      sums = takeDown(problem, contacts, problem.rows.size(), impulses);
+      sums = takeDown(problem, colouring, contacts);
+    }
+    if (problem.isScaled()) {
+      scaleOut(problem);
     }
     report.restitutionLoss = problem.energyOut(sums[0]);
     report.frictionLoss = problem.energyOut(sums[1]);
@@ -43,8 +44,10 @@ class ContactEnergy {
   }
 
  private:
-  using Row = detail::SolverRow<S>;
   using Body = detail::SolverBody<S>;
+  using Pack = detail::Packed<S>;
+  using Group = detail::RowGroup<S>;
+  using Lanes = detail::RowLanes<S>;
   /// Losses along the normal and across it, work of drift, sum of the contacts' terms that are gains.
   using Sums = Eigen::Array<S, 4, 1>;
   static constexpr std::size_t chunk = 512;
@@ -64,23 +67,21 @@ class ContactEnergy {
     S beta = S(1);
   };
 
-  /// J_n v_n, and J_t.v_t with what turns, at the velocities `b1` and `b2`. \param jt has no part along n
+  /// J_n v_n, and J_t.v_t with what turns, at the velocities in `bodies`, which are b1 and b2.
   template <class B>
-  static std::array<S, 2> power(const ContactProblem<S>& problem, std::size_t k, const S& jn,
-                                const Vector3<S>& jt, const B& b1, const B& b2, const Vector3<S>& drift) {
-    const Row& row = problem.rows[k];
-    Vector3<S> v_rel = b2.v - b1.v;
-    if (problem.drifting) {
-      v_rel += drift;
-    }
-    S across(0);
-    if (row.stick > S(0)) {
-      across = jt.dot(Vector3<S>(v_rel - Vector3<S>(row.c1 * b1.s + row.c2 * b2.s).cross(row.n)));
-    }
+  [[gnu::always_inline]] static inline std::array<Pack, 2> power(
+      const ContactProblem<S>& problem, const Group& group, const Lanes& row, const std::vector<B>& bodies,
+      const detail::BodyLanes<S>& b1, const detail::BodyLanes<S>& b2, const detail::PackedVector<S>& drift) {
+    const detail::PackedVector<S> v_rel = b2.v - b1.v + drift;
+    const Pack v_n = row.n.dot(v_rel);
+    Pack across = row.jt.dot(slipVelocity(row, v_rel, v_n, b1, b2));
     if (!problem.turning.empty()) {
-      across += problem.turning[k].l.dot(problem.turning[k].rho(b1, b2));
+      across = across + Pack::of([&](std::size_t lane) {
+                 const detail::TurningRow<S>& turning = problem.turning[group.row[lane]];
+                 return S(turning.l.dot(turning.rho(bodies[group.slot1[lane]], bodies[group.slot2[lane]])));
+               });
     }
-    return {jn * row.n.dot(v_rel), across};
+    return {row.jn * v_n, across};
   }
 
   /// The means of the bodies' velocities before and after.
@@ -95,55 +96,83 @@ class ContactEnergy {
     });
   }
 
-  static Vector3<S> driftOf(const ContactProblem<S>& problem, const ContactView<S>& contacts,
-                            const Row& row) {
-    return problem.drifting ? problem.speedIn(contacts.drift(contacts[row.contact]))
-                            : Vector3<S>(Vector3<S>::Zero());
+  static detail::PackedVector<S> driftOf(const ContactProblem<S>& problem, const ContactColoring& colouring,
+                                         const ContactView<S>& contacts, const Group& group) {
+    if (!problem.drifting) {
+      return detail::PackedVector<S>::zero();
+    }
+    const auto part = [&](Eigen::Index c) {
+      return Pack::of([&](std::size_t lane) {
+        return S(problem.speedIn(contacts.drift(contacts[colouring.rows()[group.row[lane]].contact]))[c]);
+      });
+    };
+    return {part(0), part(1), part(2)};
   }
 
-  /// \param kept from this row on impulses are those of the last problem
-  Sums takeDown(const ContactProblem<S>& problem, const ContactView<S>& contacts, std::size_t kept,
-                detail::ImpulseList<S>& impulses) {
+  Sums takeDown(ContactProblem<S>& problem, const ContactColoring& colouring,
+                const ContactView<S>& contacts) {
     findMeans(problem);
-    return orderedSum(problem.rows.size(), chunk, Sums(Sums::Zero()),
-                      [&](std::size_t begin, std::size_t end) {
-                        Sums sums = Sums::Zero();
-                        for (std::size_t k = begin; k < end; ++k) {
-                          const Row& row = problem.rows[k];
-                          if (k + problem.lookAhead < problem.rows.size()) {
-                            const Row& later = problem.rows[k + problem.lookAhead];
-                            detail::prefetch(means_[later.slot1]);
-                            detail::prefetch(means_[later.slot2]);
-                          }
-                          terms_[k] = S(0);
-                          ContactImpulse<S> impulse;
-                          impulse.impact = row.impact;
-                          const S jn = k < kept ? row.jn : problem.impulseIn(problem.last().normal(k));
-                          if (!(jn > S(0))) {
-                            impulses.set(k, impulse);
-                            continue;
-                          }
-                          const Vector3<S> jt = k < kept ? Vector3<S>(row.tangentialMass * row.u)
-                                                         : problem.impulseIn(problem.last().tangential(k));
-                          impulse.normal = problem.impulseOut(jn);
-                          impulse.tangential = problem.impulseOut(jt);
-                          if (!problem.turning.empty()) {
-                            impulse.turning = problem.impulseOut(problem.turning[k].l);
-                          }
-                          impulses.set(k, impulse);
-                          const Vector3<S> drift = driftOf(problem, contacts, row);
-                          const auto [normal, across] =
-                              power(problem, k, jn, jt, means_[row.slot1], means_[row.slot2], drift);
-                          terms_[k] = normal + across;
-                          sums[0] -= normal;
-                          sums[1] -= across;
-                          if (problem.drifting) {
-                            sums[2] -= Vector3<S>(jn * row.n + jt).dot(drift);
-                          }
-                          sums[3] += std::max<S>(S(0), terms_[k]);
-                        }
-                        return sums;
-                      });
+    return orderedSum(
+        problem.rows.size(), chunk, Sums(Sums::Zero()), [&](std::size_t begin, std::size_t end) {
+          Sums sums = Sums::Zero();
+          forGroups(colouring, begin, end,
+                    [&](const Group& group) { sums += takeDown(problem, colouring, contacts, group); });
+          return sums;
+        });
+  }
+
+  template <class F>
+  void forGroups(const ContactColoring& colouring, std::size_t begin, std::size_t end, F&& f) {
+    for (std::size_t k = begin; k < end; k += Group::width) {
+      const std::size_t from = k + ContactProblem<S>::lookAhead;
+      for (std::size_t later = from; later < std::min(from + Group::width, colouring.rows().size());
+           ++later) {
+        detail::prefetch(means_[colouring.rows()[later].slot1]);
+        detail::prefetch(means_[colouring.rows()[later].slot2]);
+      }
+      f(Group::from(colouring.rows(), k, end, colouring.staticSlot()));
+    }
+  }
+
+  [[gnu::flatten]] Sums takeDown(ContactProblem<S>& problem, const ContactColoring& colouring,
+                                 const ContactView<S>& contacts, const Group& group) {
+    const Pack zero = Pack::zero();
+    Lanes row = problem.load(group, !problem.passes);
+    const auto b1 = detail::BodyLanes<S>::load(means_, group.slot1);
+    const auto b2 = detail::BodyLanes<S>::load(means_, group.slot2);
+    const auto pushes = (row.jn > zero) & (normalMobility(b1, b2) > zero);
+    row.jn = choose(pushes, row.jn, zero);
+    row.jt = choose(pushes, row.jt, detail::PackedVector<S>::zero());
+    if (problem.passes) {
+      problem.storeImpulses(group, row);
+    }
+    for (std::size_t lane = 0; lane < group.count; ++lane) {
+      const std::uint32_t k = group.row[lane];
+      problem.impulses().setImpact(k, problem.marks[k].impact);
+      if (!problem.turning.empty()) {
+        problem.turning[k].l = pushes[lane] ? problem.turning[k].l : Vector3<S>(Vector3<S>::Zero());
+        problem.impulses().setTurning(k, problem.turning[k].l);
+      }
+    }
+    const detail::PackedVector<S> drift = driftOf(problem, colouring, contacts, group);
+    const auto [normal, across] = power(problem, group, row, means_, b1, b2, drift);
+    const Pack term = normal + across;
+    for (std::size_t lane = 0; lane < group.count; ++lane) {
+      terms_[group.row[lane]] = term[lane];
+    }
+    const Pack work = problem.drifting ? row.wholeImpulse().dot(drift) : zero;
+    return Sums(-normal.sum(), -across.sum(), -work.sum(), largerOf(term, zero).sum());
+  }
+
+  /// Of problems with masses or speeds far from 1.
+  static void scaleOut(ContactProblem<S>& problem) {
+    for (std::size_t k = 0; k < problem.rows.size(); ++k) {
+      ContactImpulse<S> j = problem.impulses().get(k);
+      j.normal = problem.impulseOut(j.normal);
+      j.tangential = problem.impulseOut(j.tangential);
+      j.turning = problem.impulseOut(j.turning);
+      problem.impulses().set(k, j);
+    }
   }
 
   /// Islands: movable bodies joined by contacts. dT of an island is beta a + beta^2 b under a common factor
@@ -157,21 +186,21 @@ class ContactEnergy {
     const bool any =
         std::any_of(gains_.begin(), gains_.end(), [](const Gain& gain) { return gain.isReal(); });
     if (any) {
-      if (problem.kept) {
-        problem.recall(colouring);
-      }
       problem.watch.setHolds(false);  // of what comes now
       islands_.assign(gains_.size(), Island{});
-      for (std::size_t k = 0; k < problem.rows.size(); ++k) {
-        const Row& row = problem.rows[k];
-        const std::uint32_t island = islandOfRow_[k];
-        if (gains_[island].isReal() && row.jn > S(0)) {
-          const auto [normal, across] =
-              power(problem, k, row.jn, Vector3<S>(row.tangentialMass * row.u), problem.initial[row.slot1],
-                    problem.initial[row.slot2], driftOf(problem, contacts, row));
-          islands_[island].before += normal + across;
+      forGroups(colouring, 0, problem.rows.size(), [&](const Group& group) {
+        const Lanes row = problem.load(group, true);
+        const auto [normal, across] = power(problem, group, row, problem.initial,
+                                            detail::BodyLanes<S>::load(problem.initial, group.slot1),
+                                            detail::BodyLanes<S>::load(problem.initial, group.slot2),
+                                            driftOf(problem, colouring, contacts, group));
+        const Pack term = normal + across;
+        for (std::size_t lane = 0; lane < group.count; ++lane) {
+          if (row.jn[lane] > S(0)) {
+            islands_[islandOfRow_[group.row[lane]]].before += term[lane];
+          }
         }
-      }
+      });
       for (std::size_t slot = 0; slot < islands_.size(); ++slot) {
         Island& island = islands_[slot];
         if (gains_[slot].isReal()) {
@@ -233,8 +262,7 @@ class ContactEnergy {
     for (std::size_t k = 0; k < problem.rows.size(); ++k) {
       const S beta = islands_[islandOfRow_[k]].beta;
       if (beta < S(1)) {
-        problem.rows[k].jn *= beta;
-        problem.rows[k].u *= beta;
+        problem.impulses().scale(k, beta);
         if (!problem.turning.empty()) {
           problem.turning[k].l *= beta;
         }

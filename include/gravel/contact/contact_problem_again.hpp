@@ -21,25 +21,21 @@ bool ContactProblem<S>::isPassed(std::size_t k, const ContactColoring& colouring
 }
 
 template <Real S>
-void ContactProblem<S>::repeat(std::size_t k) {
-  const detail::RowGuess<S> first = firstGuess(k);
-  rows[k].jn = first.jn;
-  rows[k].u = first.u;
-  if (!turning.empty()) {
-    turning[k].l = impulseIn(Vector3<S>(ratio_ * last_->turning(k)));
-  }
+void ContactProblem<S>::recall(const ContactColoring& colouring) {
+  parallelForChunks<Share::Alike>(rows.size(), chunk, [&](std::size_t begin, std::size_t end) {
+    forGroupsOf(
+        colouring, begin, end, [&](std::size_t k) { return !marks[k].taken; },
+        [&](const Group& group) { storeImpulses(group, load(group, false)); });
+  });
 }
 
 template <Real S>
-void ContactProblem<S>::recall(const ContactColoring& colouring) {
-  parallelFor(rows.size() - colouring.loneCount(), chunk, [&](std::size_t i) {
-    const std::size_t k = colouring.loneCount() + i;
-    if (isPassed(k, colouring)) {
-      rows[k].slides = 0;
-      rows[k].sliding = false;
-      repeat(k);
-    }
-  });
+void ContactProblem<S>::keepLast(const ContactColoring& colouring, detail::ImpulseList<S>& last) {
+  for (std::size_t k = 0; k < colouring.loneCount(); ++k) {
+    last.set(k, impulses_->get(k));
+  }
+  passes = false;
+  std::swap(last, *impulses_);
 }
 
 template <Real S>

@@ -97,14 +97,17 @@ class ContactSolver {
     if (!contacts.empty()) {
       // Forces that last give impulses in proportion of the steps.
       const S ratio = settings_.warmStart && memoryStep_ > S(0) ? S(dt / memoryStep_) : S(0);
-      problem_.gather(contacts, bodies, coloring_, dt, settings_, facts_.kinds, rowsBefore_, ratio, fresh_,
-                      goesOn && ratio > S(0),
-                      [&](std::size_t k) { return detail::RowImpulses<S>::wrongAt(problem_, k); });
+      rowImpulses_.resize(contacts.size(), facts_.kinds.turn);
+      problem_.gather(contacts, bodies, coloring_, dt, settings_, facts_.kinds, rowImpulses_, rowsBefore_,
+                      ratio, fresh_, goesOn && ratio > S(0));
       fresh_ = false;
       if (problem_.active) {
         report = std::visit([&](auto& algorithm) { return algorithm.solve(problem_, coloring_, settings_); },
                             algorithm_);
-        energy_.settle(problem_, coloring_, contacts, otherRows_, report, rowImpulses_);
+        if (problem_.kept) {
+          problem_.keepLast(coloring_, rowsBefore_);
+        }
+        energy_.settle(problem_, coloring_, contacts, otherRows_, report);
         otherRows_ = false;
         problem_.scatter(bodies, coloring_);
         goesOn_ = true;

@@ -4,6 +4,7 @@
 /// The impulses of many contacts, in little room.
 
 #include <gravel/contact/contact_settings.hpp>
+#include <gravel/contact/row_lanes.hpp>
 #include <gravel/core/memory.hpp>
 #include <gravel/core/parallel.hpp>
 
@@ -46,12 +47,33 @@ class ImpulseList {
 
   /// What resists turning is left out unless the list turns().
   void set(std::size_t k, const ContactImpulse<S>& j) {
-    pushes_[k] = {j.normal, j.tangential};
+    pushes_[k] = {j.tangential, j.normal};
     impacts_[k] = j.impact ? 1 : 0;
     if (!turning_.empty()) {
       turning_[k] = j.turning;
     }
   }
+
+  /// Tangential and normal one of a row: four scalars.
+  const S* quad(std::size_t k) const { return quadOf<S>(pushes_[k], 0); }
+  /// The same of these rows.
+  [[gnu::always_inline]] inline PackedQuad<S> load(const RowGroup<S>& group) const {
+    return PackedQuad<S>::load([&](std::size_t lane) { return quad(group.row[lane]); });
+  }
+  /// The same put here; what else they have is set by itself.
+  [[gnu::always_inline]] inline void store(const RowGroup<S>& group, const PackedQuad<S>& j) {
+    j.store([&](std::size_t lane) { return quadOf<S>(pushes_[group.row[lane]], 0); },
+            [&](std::size_t lane) { return group.holds(lane); });
+  }
+  void setPush(std::size_t k, const S& normal, const Vector3<S>& tangential) {
+    pushes_[k] = {tangential, normal};
+  }
+  void scale(std::size_t k, const S& factor) {
+    pushes_[k].normal *= factor;
+    pushes_[k].tangential *= factor;
+  }
+  void setImpact(std::size_t k, bool impact) { impacts_[k] = impact ? 1 : 0; }
+  void setTurning(std::size_t k, const Vector3<S>& turning) { turning_[k] = turning; }
 
   /// All, entry placeOf(k) as the k-th.
   template <class PlaceOf>
@@ -64,9 +86,9 @@ class ImpulseList {
  private:
   static constexpr std::size_t chunk = 512;
 
-  struct Push {
-    S normal = S(0);
+  struct Push {  // a quad of scalars
     Vector3<S> tangential = Vector3<S>::Zero();
+    S normal = S(0);
   };
 
   std::vector<Push> pushes_;

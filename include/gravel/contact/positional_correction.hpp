@@ -93,8 +93,9 @@ class PositionalCorrection {
              sum);
         watch_.enter(k, place.slot1, place.slot2);
       };
-      Opened opened = detail::sumOverRows(0, colouring.loneCount(), Opened{}, one);
-      opened += detail::sumOverColours(colouring, Opened{}, one);
+      const auto each = detail::eachRow(one);
+      Opened opened = detail::sumOverParts(0, colouring.loneCount(), Opened{}, each);
+      opened += detail::sumOverColourParts(colouring, Opened{}, each);
       report.residual = opened.largest;
       report.loss += opened.loss;
       ++report.iterations;

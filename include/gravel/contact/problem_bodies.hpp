@@ -6,6 +6,7 @@
 #include <gravel/contact/contact_coloring.hpp>
 #include <gravel/contact/row_watch.hpp>
 #include <gravel/contact/solver_rows.hpp>
+#include <gravel/core/packed.hpp>
 #include <gravel/core/parallel.hpp>
 
 #include <vector>
@@ -52,9 +53,17 @@ class ProblemBodies {
   Vector3<S> impulseOut(const Vector3<S>& j) const { return scaled<S>(j, -speedExponent_ - massExponent_); }
   S impulseIn(const S& j) const { return scaled<S>(j, speedExponent_ + massExponent_); }
   Vector3<S> impulseIn(const Vector3<S>& j) const { return scaled<S>(j, speedExponent_ + massExponent_); }
+  bool isScaled() const { return speedExponent_ != 0 || massExponent_ != 0; }
   S energyOut(const S& e) const { return scaled<S>(e, -2 * speedExponent_ - massExponent_); }
   S speedIn(const S& v) const { return scaled<S>(v, speedExponent_); }
   Vector3<S> speedIn(const Vector3<S>& v) const { return scaled<S>(v, speedExponent_); }
+  Packed<S> speedIn(const Packed<S>& v) const { return scaledLanes(v, speedExponent_); }
+  PackedQuad<S> impulseIn(const PackedQuad<S>& j) const {
+    return scaledLanes(j, speedExponent_ + massExponent_);
+  }
+  PackedQuad<S> impulseOut(const PackedQuad<S>& j) const {
+    return scaledLanes(j, -speedExponent_ - massExponent_);
+  }
 
  protected:
   static constexpr std::size_t chunk = 512;

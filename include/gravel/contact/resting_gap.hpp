@@ -4,6 +4,7 @@
 /// The gap that a contact at rest may have.
 
 #include <gravel/contact/contact.hpp>
+#include <gravel/core/packed.hpp>
 
 #include <algorithm>
 
@@ -23,23 +24,19 @@ S restingMargin() {
 /// that would be the overlaps of the next step: heaps crept for ever.
 template <Real S>
 struct RestingGap {
-  S size;    ///< [m] < 0 is overlap
-  S closed;  ///< [m] that counts as closed, at most
+  using P = Packed<S>;
 
-  static RestingGap of(const Contact<S>& c) {
-    return {c.gap, restingMargin<S>() / S(64) * (c.arm1 + c.arm2 - c.gap)};
-  }
-
-  /// [m s^-1] >= 0 \param accelerations |a_1| + |a_2| of the two [m s^-2]  \param dt [s]
-  [[gnu::always_inline]] S allowedApproach(const S& accelerations, const S& dt) const {
-    if (!(size > S(0))) {
-      return S(0);
-    }
+  /// [m s^-1] >= 0 \param gap [m] < 0 is overlap \param radii [m] their sum
+  /// \param accelerations |a_1| + |a_2| of the two [m s^-2] \param dt [s]
+  [[gnu::always_inline]] static inline P allowedApproach(const P& gap, const P& radii, const P& accelerations,
+                                                         const S& dt) {
+    const P open = choose(gap > P::zero(), gap, P::zero());
     if (!(dt > S(0))) {
-      return Eigen::NumTraits<S>::highest();
+      return choose(open > P::zero(), P::all(Eigen::NumTraits<S>::highest()), P::zero());
     }
-    const S kept = std::min<S>(closed, accelerations * dt * dt / S(64));
-    return size > kept ? S((size - kept) / dt) : S(0);
+    const P closed = P::all(restingMargin<S>() / S(64)) * radii;
+    const P kept = smallerOf(closed, accelerations * P::all(S(dt * dt / S(64))));
+    return choose(open > kept, (open - kept) / P::all(dt), P::zero());
   }
 };
 

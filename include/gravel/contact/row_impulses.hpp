@@ -11,7 +11,8 @@ template <Real S>
 struct RowImpulses {
   using Row = SolverRow<S>;
   using Body = SolverBody<S>;
-  static constexpr std::uint8_t patience = 8;
+  using Group = RowGroup<S>;
+  using Lanes = RowLanes<S>;
 
   /// What a sweep did: largest change of a velocity, squared; and products, over mass, of the changes of the
   /// impulses with the whole step since the sweep before, and with themselves.
@@ -31,62 +32,36 @@ struct RowImpulses {
     }
   };
 
-  /// Friction of a row for its normal impulse. \param step of u, to which its change is added
-  /// \return the change of the tangential impulse
-  [[gnu::always_inline]] static inline Vector3<S> rubbed(Row& row, const Vector3<S>& slip, Vector3<S>& step,
-                                                         Progress& progress) {
-    using std::sqrt;
-    Vector3<S> u = row.u - slip;
-    const S size_sq = u.squaredNorm();
-    // A contact that keeps changing its mind between sticking and sliding slides: sweeps must end.
-    const S stick = (row.slides < patience ? row.stick : row.slide) * row.jn;
-    const bool slides = size_sq > stick * stick;
-    if (slides) {
-      row.slides = static_cast<std::uint8_t>(row.slides + (row.sliding ? 0U : 1U));
-      u *= row.slide * row.jn / S(sqrt(size_sq));
-    }
-    row.sliding = slides;
-    const Vector3<S> du = u - row.u;
-    row.u = u;
-    step += du;
-    const S change_sq = du.squaredNorm();
-    progress += {change_sq, row.tangentialMass * du.dot(step), row.tangentialMass * change_sq};
-    return row.tangentialMass * du;
-  }
-
-  /// The change of a velocity, squared, that a sweep would make in row k now. Resistance to turning left out.
-  [[gnu::flatten]] static S wrongAt(const ContactProblem<S>& problem, std::size_t k) {
-    Row row = problem.rows[k];
-    const Body& b1 = problem.bodies[row.slot1];
-    const Body& b2 = problem.bodies[row.slot2];
-    const S jn = row.jn;
-    const S next = jn + row.normalMass * (row.target - normalVelocity(row, b1, b2));
-    row.jn = next > S(0) ? next : S(0);
-    const S change = (row.jn - jn) * (b1.inverseMass + b2.inverseMass);
-    Progress progress{change * change};
-    if (row.stick > S(0) && (row.jn > S(0) || row.u != Vector3<S>::Zero())) {
-      Vector3<S> slip = slipVelocity(row, b1, b2);
-      if (!problem.slipTargets.empty()) {
-        slip -= problem.slipTargets[k];
+  /// Takes down which rows slide now.
+  [[gnu::always_inline]] static inline void mark(ContactProblem<S>& problem, const Group& group,
+                                                 const RowChanges<S>& changes) {
+    for (std::size_t lane = 0; lane < group.count; ++lane) {
+      RowMark& row = problem.marks[group.row[lane]];
+      const bool slides = changes.slides[lane];
+      if (slides && !row.sliding && row.slides < RowMark::patience) {
+        ++row.slides;
       }
-      Vector3<S> step = Vector3<S>::Zero();
-      rubbed(row, slip, step, progress);
+      row.sliding = changes.rubs[lane] ? slides : row.sliding;
     }
-    return progress.change_sq;
   }
 
-  static Progress rub(ContactProblem<S>& problem, std::size_t k, Body& b1, Body& b2) {
-    Row& row = problem.rows[k];
-    Vector3<S> slip = slipVelocity(row, b1, b2);
-    if (!problem.slipTargets.empty()) {
-      slip -= problem.slipTargets[k];
-    }
-    Progress progress;
-    Vector3<S> step = Vector3<S>::Zero();
-    const Vector3<S> dj = rubbed(row, slip, step, progress);
-    push(b1, b2, dj);
-    twist(row, b1, b2, dj);
-    return progress;
+  /// Friction of row k alone, for its normal impulse.
+  static Progress rub(ContactProblem<S>& problem, const ContactColoring& colouring, std::size_t k) {
+    const Group group = Group::from(colouring.rows(), k, k + 1, colouring.staticSlot());
+    Lanes row = problem.load(group, true);
+    auto b1 = BodyLanes<S>::load(problem.bodies, group.slot1);
+    auto b2 = BodyLanes<S>::load(problem.bodies, group.slot2);
+    const PackedVector<S> v_rel = b2.v - b1.v;
+    RowChanges<S> changes;
+    rubRight(row, b1, b2, problem.slipOf(group, slipVelocity(row, v_rel, row.n.dot(v_rel), b1, b2)),
+             problem.tired(group), changes);
+    mark(problem, group, changes);
+    push(b1, b2, changes.dt);
+    twist(row, b1, b2, changes.dt);
+    problem.storeImpulses(group, row);
+    b1.store(problem.bodies, group.slot1, true);
+    b2.store(problem.bodies, group.slot2, true);
+    return {changes.du.squaredNorm()[0]};
   }
 
   /// Resistance to rolling and spinning of a row for its normal impulse.
@@ -96,7 +71,7 @@ struct RowImpulses {
       return {};
     }
     const Vector3<S> l = resistTurning<S>(Vector3<S>(row.l - row.mass * row.rho(b1, b2)), problem.rows[k].n,
-                                          problem.rows[k].jn, row.rolling, row.spinning);
+                                          problem.impulses().normal(k), row.rolling, row.spinning);
     const Vector3<S> dl = l - row.l;
     row.l = l;
     row.step += dl;

@@ -27,12 +27,15 @@ namespace gravel {
 template <Real S>
 class SequentialImpulses : private detail::RowImpulses<S> {
   using Base = detail::RowImpulses<S>;
+  using Base::mark;
   using Base::resist;
   using Base::rub;
-  using Base::rubbed;
   using typename Base::Body;
+  using typename Base::Group;
+  using typename Base::Lanes;
   using typename Base::Progress;
   using typename Base::Row;
+  using Pack = detail::Packed<S>;
 
  public:
   static constexpr const char* name() { return "sequential impulses"; }
@@ -45,8 +48,12 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     using std::sqrt;
     ContactReport<S> report;
     problem.watch.setHolds(false);
-    detail::sumOverRows(0, colouring.loneCount(), Progress{},
-                        [&](std::size_t k, Progress& /*sum*/) { strike(problem, k); });
+    detail::sumOverParts(0, colouring.loneCount(), Progress{},
+                         [&](std::size_t begin, std::size_t end, Progress& /*sum*/) {
+                           for (std::size_t k = begin; k < end; ++k) {
+                             strike(problem, colouring, k);
+                           }
+                         });
     report.looks = colouring.loneCount();
     if (colouring.loneCount() == problem.rows.size()) {
       report.iterations = 1;  // exact
@@ -69,7 +76,6 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     }
     bool local = problem.passes;
     if (local) {  // only rows that were not passed over are stale
-      problem.recall(colouring);
       problem.watch.goOn(enough / S(2));
     } else {
       problem.watch.begin(problem.bodies.size(), problem.rows.size(), S(enough / S(2)));
@@ -77,14 +83,9 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     bool watched = true;  // all that moves bodies
     detail::SweepMomentum<S> momentum;
     while (true) {
-      const Progress now = detail::sumOverColours(colouring, Progress{}, [&](std::size_t k, Progress& sum) {
-        if (local) {
-          relaxStale(problem, colouring.rows()[k], k, sum);
-        } else {
-          relaxNext(problem, k, momentum.beta, report.iterations == 0 || !accelerate, sum);
-        }
-      });
-      watched = watched && (local || report.iterations == 0 || !accelerate);
+      const bool alone = local || report.iterations == 0 || !accelerate;  // without momentum
+      const Progress now = sweep(problem, colouring, local, alone, momentum.beta);
+      watched = watched && alone;
       ++report.iterations;
       report.looks += local ? now.looked : count;
       const S change = sqrt(now.change_sq);
@@ -96,13 +97,17 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       local = local || (report.iterations == 1 && now.changed < count / few);
       if (local) {
         local = report.looks < 2 * problem.rows.size();
+        if (!local && problem.passes) {
+          problem.recall(colouring);
+          problem.passes = false;
+        }
         if (!local && accelerate) {
           steps_.assign(problem.rows.size(), RowStep{});
           begin(problem);
         }
       } else if (accelerate) {
         if (report.iterations == 1) {
-          findSteps(problem, colouring.loneCount());
+          findSteps(problem, colouring);
         }
         const S old = momentum.beta;
         if (momentum.stalls(now.along, now.size, problem.friction, report.iterations)) {
@@ -125,20 +130,41 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     Vector3<S> ds = Vector3<S>::Zero();
   };
 
-  /// Of a row's jn and u, from sweep to sweep.
+  /// Of the impulses of a row, from sweep to sweep: a quad of scalars.
   struct RowStep {
+    Vector3<S> t = Vector3<S>::Zero();
     S n = S(0);
-    Vector3<S> u = Vector3<S>::Zero();
+  };
+  struct StepLanes {
+    detail::PackedVector<S> t = detail::PackedVector<S>::zero();
+    Pack n = Pack::zero();
   };
 
+  StepLanes loadStep(const Group& group) const {
+    const auto quad = detail::PackedQuad<S>::load(
+        [&](std::size_t lane) { return detail::quadOf<S>(steps_[group.row[lane]], 0); });
+    return {detail::PackedVector<S>::of(quad), quad.w};
+  }
+  void storeStep(const Group& group, const StepLanes& step) {
+    detail::PackedQuad<S>{step.t.x, step.t.y, step.t.z, step.n}.store(
+        [&](std::size_t lane) { return detail::quadOf<S>(steps_[group.row[lane]], 0); },
+        [&](std::size_t lane) { return group.holds(lane); });
+  }
+
   /// Steps of the first sweep: kept by none that stops there, or goes on with a few rows.
-  void findSteps(const ContactProblem<S>& problem, std::size_t loneCount) {
+  void findSteps(const ContactProblem<S>& problem, const ContactColoring& colouring) {
     steps_.resize(problem.rows.size());
-    parallelFor(problem.rows.size() - loneCount, chunk, [&](std::size_t i) {
-      const std::size_t k = loneCount + i;
-      const auto first = problem.firstGuess(k);
-      steps_[k] = {S(problem.rows[k].jn - first.jn), Vector3<S>(problem.rows[k].u - first.u)};
-    });
+    parallelForChunks<Share::Alike>(
+        problem.rows.size() - colouring.loneCount(), chunk, [&](std::size_t begin, std::size_t end) {
+          problem.forGroups(
+              colouring, colouring.loneCount() + begin, colouring.loneCount() + end, [&](const Group& group) {
+                const Lanes row = problem.load(group, true);
+                Lanes first = row;
+                problem.takeGuess(group, first, detail::BodyLanes<S>::load(problem.bodies, group.slot1),
+                                  detail::BodyLanes<S>::load(problem.bodies, group.slot2));
+                storeStep(group, {row.jt - first.jt, row.jn - first.jn});
+              });
+        });
   }
 
   void begin(const ContactProblem<S>& problem) {
@@ -165,17 +191,18 @@ class SequentialImpulses : private detail::RowImpulses<S> {
   }
 
   /// A contact alone: in two strokes, stop and rebound, so that a head-on blow ends at exactly its target.
-  static void strike(ContactProblem<S>& problem, std::size_t k) {
-    Row& row = problem.rows[k];
-    Body& b1 = problem.bodies[row.slot1];
-    Body& b2 = problem.bodies[row.slot2];
+  static void strike(ContactProblem<S>& problem, const ContactColoring& colouring, std::size_t k) {
+    const Row& row = problem.rows[k];
+    Body& b1 = problem.bodies[colouring.rows()[k].slot1];
+    Body& b2 = problem.bodies[colouring.rows()[k].slot2];
     const S v_n = detail::normalVelocity(row, b1, b2);
     if (!(v_n < row.target)) {
       return;
     }
     const S share1 = b1.inverseMass / (b1.inverseMass + b2.inverseMass);
     const S share2 = b2.inverseMass / (b1.inverseMass + b2.inverseMass);
-    row.jn = row.normalMass * (row.target - v_n);
+    const S jn = detail::reciprocal<S>(detail::normalMobility(b1, b2)) * (row.target - v_n);
+    problem.impulses().setPush(k, jn, Vector3<S>::Zero());
     for (const S& dv : {S(-v_n), row.target}) {
       if (share1 > S(0)) {
         b1.v -= (share1 * dv) * row.n;
@@ -185,7 +212,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       }
     }
     if (row.stick > S(0)) {
-      rub(problem, k, b1, b2);
+      rub(problem, colouring, k);
     }
     if (!problem.turning.empty() && problem.turning[k].mass > S(0)) {
       // Friction and resistance act on one spin: in turns, each taking 2/7 or more off what is left.
@@ -195,7 +222,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       for (int turn = 0; turn < 200; ++turn) {
         Progress progress = resist(problem, k, b1, b2);
         if (row.stick > S(0)) {
-          progress += rub(problem, k, b1, b2);
+          progress += rub(problem, colouring, k);
         }
         if (!(progress.change_sq > enough * enough)) {
           break;
@@ -204,112 +231,113 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     }
   }
 
-  /// A row in the order of all. \param watched goes without momentum, and others may be passed over
-  /// afterwards
-  void relaxNext(ContactProblem<S>& problem, std::size_t k, const S& beta, bool watched, Progress& sum) {
-    if (k + ContactProblem<S>::lookAhead < problem.rows.size()) {
-      const Row& later = problem.rows[k + ContactProblem<S>::lookAhead];
-      detail::prefetch(problem.bodies[later.slot1]);
-      detail::prefetch(problem.bodies[later.slot2]);
-    }
-    watched ? relax<true>(problem, k, beta, sum) : relax<false>(problem, k, beta, sum);
+  /// Once over all rows, or over those whose ends do not stand nearly as they did when they were right.
+  /// \param watched goes without momentum, and rows may be passed over afterwards
+  Progress sweep(ContactProblem<S>& problem, const ContactColoring& colouring, bool local, bool watched,
+                 const S& beta) {
+    return detail::sumOverColourParts(
+        colouring, Progress{}, [&](std::size_t begin, std::size_t end, Progress& sum) {
+          if (local) {
+            const auto stale = [&](std::size_t k) {
+              const ContactColoring::Row& ends = colouring.rows()[k];
+              return problem.watch.isStale(k, ends.slot1, ends.slot2);
+            };
+            problem.forGroupsOf(colouring, begin, end, stale, [&](const Group& group) {
+              relax<true>(problem, group, S(0), sum);
+              sum.looked += group.count;
+            });
+          } else {
+            problem.forGroups(colouring, begin, end, [&](const Group& group) {
+              watched ? relax<true>(problem, group, S(0), sum) : relax<false>(problem, group, beta, sum);
+            });
+          }
+        });
   }
 
-  /// A row, unless its ends stand nearly as they did when it was right.
-  void relaxStale(ContactProblem<S>& problem, const ContactColoring::Row& ends, std::size_t k,
-                  Progress& sum) {
-    if (problem.watch.isStale(k, ends.slot1, ends.slot2)) {
-      relax<true>(problem, k, S(0), sum);
-      ++sum.looked;
-    }
-  }
-
+  /// First on along the last step (none while it is watched), then to where these contacts are right.
   template <bool Watched>
-  void relax(ContactProblem<S>& problem, std::size_t k, const S& beta, Progress& sum) {
-    problem.friction ? relaxRow<true, Watched>(problem, k, beta, sum)
-                     : relaxRow<false, Watched>(problem, k, beta, sum);
-  }
-
-  /// First on along the last step (none while it is watched), then to where this contact is right. The normal
-  /// impulse leaves the slip as it is, so that both are found from the same velocities.
-  template <bool Friction, bool Watched>
-  [[gnu::flatten]] void relaxRow(ContactProblem<S>& problem, std::size_t k, const S& beta, Progress& sum) {
-    using std::sqrt;
-    Row& row = problem.rows[k];
-    Body& b1 = problem.bodies[row.slot1];
-    Body& b2 = problem.bodies[row.slot2];
-    const Vector3<S> v_rel = b2.v - b1.v;
-    const S v_n = row.n.dot(v_rel);
-    RowStep step;
+  [[gnu::flatten]] void relax(ContactProblem<S>& problem, const Group& group, const S& beta, Progress& sum) {
+    Lanes row = problem.load(group, !problem.passes);
+    auto b1 = detail::BodyLanes<S>::load(problem.bodies, group.slot1);
+    auto b2 = detail::BodyLanes<S>::load(problem.bodies, group.slot2);
+    StepLanes step;
     if constexpr (!Watched) {
-      step = {S(steps_[k].n * beta), Vector3<S>(steps_[k].u * beta)};
+      step = loadStep(group);
+      step.n = Pack::all(beta) * step.n;
+      step.t = Pack::all(beta) * step.t;
+      row.jn = row.jn + step.n;
+      row.jt = row.jt + step.t;
     }
-    const S jn = row.jn + step.n;
-    const S next = jn + row.normalMass * (row.target - v_n);
-    row.jn = next > S(0) ? next : S(0);
-    const S dj = row.jn - jn;
-    step.n += dj;
+    const detail::RowChanges<S> changes = problem.change(group, row, b1, b2);
+    step.n = step.n + changes.dj;
+    step.t = step.t + changes.dt;
+    push(b1, b2, changes.dj * row.n + changes.dt);
+    if (problem.friction) {
+      mark(problem, group, changes);
+      twist(row, b1, b2, changes.dt);
+    }
+    b1.store(problem.bodies, group.slot1, problem.friction);
+    b2.store(problem.bodies, group.slot2, problem.friction);
+    problem.storeImpulses(group, row);
     Progress progress;
-    const S change = dj * (b1.inverseMass + b2.inverseMass);
-    progress.change_sq = change * change;
-    progress.along = step.n * change;
-    progress.size = dj * change;
-    Vector3<S> j = dj * row.n;
-    S push_t(0);  // |its part across n|, or more
-    S turn1(0);
-    S turn2(0);
-    if constexpr (Friction) {
-      if (row.stick > S(0)) {
-        if constexpr (!Watched) {
-          row.u += step.u;
-        }
-        if (row.jn > S(0) || row.u != Vector3<S>::Zero()) {
-          Vector3<S> slip = v_rel - v_n * row.n - Vector3<S>(row.c1 * b1.s + row.c2 * b2.s).cross(row.n);
-          if (!problem.slipTargets.empty()) {
-            slip -= problem.slipTargets[k];
-          }
-          const Vector3<S> dt = rubbed(row, slip, step.u, progress);
-          j += dt;
-          detail::twist(row, b1, b2, dt);
-          if constexpr (Watched) {
-            push_t = detail::sumAbs(dt);
-            turn1 = row.c1 * b1.spin * push_t;
-            turn2 = row.c2 * b2.spin * push_t;
-          }
-        }
-      }
-    }
-    if (j != Vector3<S>::Zero()) {
-      detail::push(b1, b2, j);
-    }
-    if constexpr (Friction) {
-      if (!problem.turning.empty()) {
-        problem.turning[k].step *= Watched ? S(0) : beta;
-        problem.turning[k].l += problem.turning[k].step;
-        const Progress resisted = resist(problem, k, b1, b2);
-        if constexpr (Watched) {
-          const detail::TurningRow<S>& row2 = problem.turning[k];
-          const S l = row2.mass * S(sqrt(resisted.change_sq));
-          turn1 += row2.q1 * b1.spin * l;
-          turn2 += row2.q2 * b2.spin * l;
-        }
-        progress += resisted;
-      }
-    }
+    const Pack change_sq = changes.change_sq();
+    progress.change_sq = change_sq.largest();
+    progress.along = (step.n * changes.approach + step.t.dot(changes.du)).sum();
+    progress.size = (changes.dj * changes.approach + changes.dt.dot(changes.du)).sum();
     if constexpr (!Watched) {
-      steps_[k] = step;
+      storeStep(group, step);
     } else {
-      const S push = (dj < S(0) ? S(-dj) : dj) + push_t;
-      if (b1.inverseMass > S(0)) {
-        problem.watch.move(row.slot1, b1.inverseMass * push + turn1);
+      const Pack push_t = changes.dt.sumAbs();  // |its part across n|, or more
+      const Pack push = sizeOf(changes.dj) + push_t;
+      watchMoves(problem, group.slot1, b1, b1.inverseMass * push + row.c1 * b1.spin * push_t);
+      watchMoves(problem, group.slot2, b2, b2.inverseMass * push + row.c2 * b2.spin * push_t);
+    }
+    if (!problem.turning.empty()) {
+      resistAll<Watched>(problem, group, beta, progress);
+    }
+    if constexpr (Watched) {
+      const S still_sq = problem.watch.still() * problem.watch.still();
+      for (std::size_t lane = 0; lane < group.count; ++lane) {
+        problem.watch.enter(group.row[lane], group.slot1[lane], group.slot2[lane]);
+        progress.changed += change_sq[lane] > still_sq ? 1U : 0U;
       }
-      if (b2.inverseMass > S(0)) {
-        problem.watch.move(row.slot2, b2.inverseMass * push + turn2);
-      }
-      problem.watch.enter(k, row.slot1, row.slot2);
-      progress.changed = progress.change_sq > problem.watch.still() * problem.watch.still() ? 1 : 0;
     }
     sum += progress;
+  }
+
+  static void watchMoves(ContactProblem<S>& problem, const typename Group::Index& slots,
+                         const detail::BodyLanes<S>& bodies, const Pack& ways) {
+    for (std::size_t lane = 0; lane < Group::width; ++lane) {
+      if (bodies.inverseMass[lane] > S(0)) {
+        problem.watch.move(slots[lane], ways[lane]);
+      }
+    }
+  }
+
+  /// Resistance to turning of the rows of a group, which are relaxed otherwise.
+  template <bool Watched>
+  static void resistAll(ContactProblem<S>& problem, const Group& group, const S& beta, Progress& progress) {
+    using std::sqrt;
+    for (std::size_t lane = 0; lane < group.count; ++lane) {
+      const std::uint32_t k = group.row[lane];
+      Body& b1 = problem.bodies[group.slot1[lane]];
+      Body& b2 = problem.bodies[group.slot2[lane]];
+      detail::TurningRow<S>& row = problem.turning[k];
+      row.step *= Watched ? S(0) : beta;
+      row.l += row.step;
+      const Progress resisted = resist(problem, k, b1, b2);
+      if constexpr (Watched) {
+        const S l = row.mass * S(sqrt(resisted.change_sq));
+        if (b1.inverseMass > S(0)) {
+          problem.watch.move(group.slot1[lane], row.q1 * b1.spin * l);
+        }
+        if (b2.inverseMass > S(0)) {
+          problem.watch.move(group.slot2[lane], row.q2 * b2.spin * l);
+        }
+        progress.changed += resisted.change_sq > problem.watch.still() * problem.watch.still() ? 1U : 0U;
+      }
+      progress += resisted;
+    }
   }
 
   std::vector<BodyStep> bodySteps_;

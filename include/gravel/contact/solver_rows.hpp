@@ -4,6 +4,7 @@
 /// Bodies and contacts as solvers see them: compact, in the units of the surface's speed.
 
 #include <gravel/contact/contact.hpp>
+#include <gravel/core/packed.hpp>
 
 #include <algorithm>
 #include <bit>
@@ -88,24 +89,25 @@ struct ProblemScales {
   }
 };
 
+/// A contact, in two quads of scalars: in double a cache line. Who its bodies are says the colouring, and its
+/// impulse stands in a list of its own, which is all that sweeps write.
 template <Real S>
 struct alignas(rowAlignment<S>) SolverRow {
   Vector3<S> n;
   S c1;  ///< arm / radius
   S c2;
-  S normalMass;      ///< 1/(1/m1 + 1/m2)
-  S tangentialMass;  ///< 1/(1/m1 (1 + c1^2/k1) + 1/m2 (1 + c2^2/k2))
-  S stick;   ///< static friction over tangentialMass: the most that `u` may be, over jn, where it sticks
-  S slide;   ///< kinetic friction over tangentialMass
   S target;  ///< v_n after the blow is at least this
-  S jn;
-  Vector3<S> u;  ///< tangential impulse over tangentialMass: the change of slip that it makes
-  std::uint32_t slot1;
-  std::uint32_t slot2;
-  std::uint32_t contact;
-  bool impact;
-  bool sliding;
-  std::uint8_t slides;  ///< how often it went from sticking to sliding
+  S stick;   ///< static friction
+  S slide;   ///< kinetic friction
+};
+
+/// What sweeps keep of a row besides.
+struct RowMark {
+  bool impact = false;
+  bool taken = false;  ///< its impulse is in the list of this problem; if not, it is that of the last one
+  bool sliding = false;
+  std::uint8_t slides = 0;  ///< how often it went from sticking to sliding, `patience` at most
+  static constexpr std::uint8_t patience = 8;
 };
 
 /// Resistance to rolling and spinning of a row; see resistTurning().
@@ -144,29 +146,16 @@ TurningRow<S> turningRow(const Material<S>& material, const S& r1, const S& r2, 
   return row;
 }
 
-/// `jn` and `u` of a row.
-template <Real S>
-struct RowGuess {
-  S jn = S(0);
-  Vector3<S> u = Vector3<S>::Zero();
-};
+/// 1/m1 + 1/m2.
+template <class B>
+[[gnu::always_inline]] inline auto normalMobility(const B& b1, const B& b2) {
+  return b1.inverseMass + b2.inverseMass;
+}
 
-/// The impulse jn n + jt, made to lie in Coulomb's cone of a row.
-template <Real S>
-[[gnu::always_inline]] inline RowGuess<S> guessOf(const SolverRow<S>& row, const S& jn,
-                                                  const Vector3<S>& jt) {
-  using std::sqrt;
-  RowGuess<S> guess{jn};
-  if (row.stick > S(0)) {
-    const S mobility = S(1) / row.tangentialMass;  // waits for no impulse
-    guess.u = mobility * Vector3<S>(jt - row.n.dot(jt) * row.n);
-    const S size_sq = guess.u.squaredNorm();
-    const S stick = row.stick * jn;
-    if (size_sq > stick * stick) {
-      guess.u *= row.slide * jn / S(sqrt(size_sq));
-    }
-  }
-  return guess;
+/// 1/m1 (1 + c1^2/k1) + 1/m2 (1 + c2^2/k2).
+template <class R, class B>
+[[gnu::always_inline]] inline auto tangentialMobility(const R& row, const B& b1, const B& b2) {
+  return normalMobility(b1, b2) + row.c1 * row.c1 * b1.spin + row.c2 * row.c2 * b2.spin;
 }
 
 template <Real S, class B>
@@ -174,32 +163,11 @@ template <Real S, class B>
   return row.n.dot(Vector3<S>(b2.v - b1.v));
 }
 
-template <Real S, class B>
-[[gnu::always_inline]] inline Vector3<S> slipVelocity(const SolverRow<S>& row, const B& b1, const B& b2) {
-  const Vector3<S> v_rel = b2.v - b1.v;
-  return v_rel - row.n.dot(v_rel) * row.n - Vector3<S>(row.c1 * b1.s + row.c2 * b2.s).cross(row.n);
-}
-
-template <Real S>
-[[gnu::always_inline]] inline void push(SolverBody<S>& b1, SolverBody<S>& b2, const Vector3<S>& j) {
-  if (b1.inverseMass > S(0)) {  // immovable bodies are shared between threads: never written
-    b1.v -= b1.inverseMass * j;
-  }
-  if (b2.inverseMass > S(0)) {
-    b2.v += b2.inverseMass * j;
-  }
-}
-
-template <Real S>
-[[gnu::always_inline]] inline void twist(const SolverRow<S>& row, SolverBody<S>& b1, SolverBody<S>& b2,
-                                         const Vector3<S>& j) {
-  const Vector3<S> turn = row.n.cross(j);
-  if (b1.inverseMass > S(0)) {
-    b1.s -= (row.c1 * b1.spin) * turn;
-  }
-  if (b2.inverseMass > S(0)) {
-    b2.s -= (row.c2 * b2.spin) * turn;
-  }
+/// Tangential part of u, at the top of impulses.hpp. \param v_rel v2 - v1 \param v_n n.v_rel
+template <class R, class V, class N, class B>
+[[gnu::always_inline]] inline V slipVelocity(const R& row, const V& v_rel, const N& v_n, const B& b1,
+                                             const B& b2) {
+  return V(V(v_rel - V(v_n * row.n)) - V(V(row.c1 * b1.s) + V(row.c2 * b2.s)).cross(row.n));
 }
 
 template <Real S>
@@ -228,6 +196,18 @@ template <Real S>
   return exponent == 0
              ? v
              : Vector3<S>(scaled<S>(v[0], exponent), scaled<S>(v[1], exponent), scaled<S>(v[2], exponent));
+}
+
+template <Real S>
+[[gnu::always_inline]] inline Packed<S> scaledLanes(const Packed<S>& x, int exponent) {
+  return exponent == 0 ? x : Packed<S>::of([&](std::size_t lane) { return scaled<S>(x[lane], exponent); });
+}
+
+template <Real S>
+[[gnu::always_inline]] inline PackedQuad<S> scaledLanes(const PackedQuad<S>& q, int exponent) {
+  return exponent == 0 ? q
+                       : PackedQuad<S>{scaledLanes(q.x, exponent), scaledLanes(q.y, exponent),
+                                       scaledLanes(q.z, exponent), scaledLanes(q.w, exponent)};
 }
 
 /// Power of two that brings numbers between low and high near 1; 0 while they are harmless anyway.

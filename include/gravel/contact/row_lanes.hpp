@@ -1,0 +1,218 @@
+#pragma once
+
+/// \file
+/// Rows and bodies of a ContactProblem in lanes: what makes a contact right while all others stand, for as
+/// many contacts at a time as are one Packed. They share no movable body, so that all may be solved at once.
+
+#include <gravel/contact/contact_coloring.hpp>
+#include <gravel/contact/solver_rows.hpp>
+#include <gravel/core/packed.hpp>
+
+#include <array>
+#include <span>
+#include <vector>
+
+namespace gravel::detail {
+
+/// Up to packWidth<S> rows; the lanes beyond `count` hold the first one again, but between two boundaries: it
+/// gets no impulse there and is never written. So a row's bits do not depend on which others are beside it.
+template <Real S>
+struct RowGroup {
+  static constexpr std::size_t width = packWidth<S>;
+  using Index = std::array<std::uint32_t, width>;
+
+  std::size_t count = 0;
+  Index row;
+  Index slot1;
+  Index slot2;
+
+  [[gnu::always_inline]] void add(std::span<const ContactColoring::Row> places, std::size_t k) {
+    row[count] = static_cast<std::uint32_t>(k);
+    slot1[count] = places[k].slot1;
+    slot2[count] = places[k].slot2;
+    ++count;
+  }
+  /// The lanes that are left over. \param boundary the slot of what never moves
+  [[gnu::always_inline]] void fill(std::uint32_t boundary) {
+    for (std::size_t lane = count; lane < width; ++lane) {
+      row[lane] = row[0];
+      slot1[lane] = slot2[lane] = boundary;
+    }
+  }
+  /// Rows k, k + 1, … below `end`.
+  [[gnu::always_inline]] static RowGroup from(std::span<const ContactColoring::Row> places, std::size_t k,
+                                              std::size_t end, std::uint32_t boundary) {
+    RowGroup group;
+    for (; k < end && group.count < width; ++k) {
+      group.add(places, k);
+    }
+    group.fill(boundary);
+    return group;
+  }
+  bool holds(std::size_t lane) const { return lane < count; }
+};
+
+/// The scalars of an object that is made of them, from the quad of that number on.
+template <Real S, class T>
+[[gnu::always_inline]] inline auto quadOf(T& object, std::size_t number) {
+  using Plain = std::conditional_t<std::is_const_v<T>, const S, S>;
+  return reinterpret_cast<Plain*>(&object) + 4 * number;
+}
+
+/// SolverBody or SolverStart, of whose scalars the fourth and the eighth are `third` and `seventh` there.
+template <Real S>
+struct BodyLanes {
+  PackedVector<S> v;
+  Packed<S> inverseMass;
+  PackedVector<S> s;
+  Packed<S> spin;
+
+  template <class B>
+  [[gnu::always_inline]] static BodyLanes load(const std::vector<B>& bodies,
+                                               const typename RowGroup<S>::Index& slots) {
+    static_assert(sizeof(B) >= 8 * sizeof(S));
+    const auto linear =
+        PackedQuad<S>::load([&](std::size_t lane) { return quadOf<S>(bodies[slots[lane]], 0); });
+    const auto angular =
+        PackedQuad<S>::load([&](std::size_t lane) { return quadOf<S>(bodies[slots[lane]], 1); });
+    return {PackedVector<S>::of(linear), linear.w, PackedVector<S>::of(angular), angular.w};
+  }
+
+  /// Immovable bodies are shared between threads: never written. \param spins whether they changed as well
+  [[gnu::always_inline]] void store(std::vector<SolverBody<S>>& bodies,
+                                    const typename RowGroup<S>::Index& slots, bool spins) const {
+    const auto moves = [&](std::size_t lane) { return inverseMass[lane] > S(0); };
+    PackedQuad<S>{v.x, v.y, v.z, inverseMass}.store(
+        [&](std::size_t lane) { return quadOf<S>(bodies[slots[lane]], 0); }, moves);
+    if (spins) {
+      PackedQuad<S>{s.x, s.y, s.z, spin}.store(
+          [&](std::size_t lane) { return quadOf<S>(bodies[slots[lane]], 1); }, moves);
+    }
+  }
+};
+
+/// SolverRow, and its impulse.
+template <Real S>
+struct RowLanes {
+  using P = Packed<S>;
+  PackedVector<S> n;
+  P c1;
+  P c2;
+  P target;
+  P stick;
+  P slide;
+  PackedVector<S> jt = PackedVector<S>::zero();
+  P jn = P::zero();
+
+  /// Without an impulse.
+  [[gnu::always_inline]] static inline RowLanes load(const std::vector<SolverRow<S>>& rows,
+                                                     const RowGroup<S>& group) {
+    const auto quad = [&](std::size_t number) {
+      return PackedQuad<S>::load(
+          [&, number](std::size_t lane) { return quadOf<S>(rows[group.row[lane]], number); });
+    };
+    const PackedQuad<S> q0 = quad(0);
+    const PackedQuad<S> q1 = quad(1);
+    return {PackedVector<S>::of(q0), q0.w, q1.x, q1.y, q1.z, q1.w};
+  }
+  /// The same.
+  [[gnu::always_inline]] inline void store(std::vector<SolverRow<S>>& rows, const RowGroup<S>& group) const {
+    const auto put = [&](std::size_t number, const PackedQuad<S>& quad) {
+      quad.store([&](std::size_t lane) { return quadOf<S>(rows[group.row[lane]], number); },
+                 [&](std::size_t lane) { return group.holds(lane); });
+    };
+    put(0, {n.x, n.y, n.z, c1});
+    put(1, {c2, target, stick, slide});
+  }
+
+  [[gnu::always_inline]] inline void setImpulse(const PackedQuad<S>& j) {
+    jt = PackedVector<S>::of(j);
+    jn = j.w;
+  }
+  [[gnu::always_inline]] inline PackedQuad<S> impulse() const { return {jt.x, jt.y, jt.z, jn}; }
+  [[gnu::always_inline]] inline PackedVector<S> wholeImpulse() const { return jn * n + jt; }
+};
+
+/// How the impulses of a group change for its rows to be right, and what that does to velocities.
+template <Real S>
+struct RowChanges {
+  using P = Packed<S>;
+  P dj = P::zero();                              ///< of the normal impulse
+  P approach = P::zero();                        ///< of the normal velocity
+  PackedVector<S> dt = PackedVector<S>::zero();  ///< of the tangential impulse
+  PackedVector<S> du = PackedVector<S>::zero();  ///< of the slip
+  typename P::Truth rubs;                        ///< friction was looked at
+  typename P::Truth slides;                      ///< and cut
+
+  /// The square of the larger change of a velocity.
+  [[gnu::always_inline]] inline P change_sq() const {
+    return largerOf(approach * approach, du.squaredNorm());
+  }
+};
+
+/// The normal impulse of `row` becomes right.
+template <Real S>
+[[gnu::always_inline]] inline void pushRight(RowLanes<S>& row, const BodyLanes<S>& b1, const BodyLanes<S>& b2,
+                                             const Packed<S>& v_n, RowChanges<S>& changes) {
+  using P = Packed<S>;
+  const P mobility = normalMobility(b1, b2);
+  const P next = row.jn + reciprocalOf(mobility) * (row.target - v_n);
+  const P jn = choose(next > P::zero(), next, P::zero());
+  changes.dj = jn - row.jn;
+  changes.approach = changes.dj * mobility;
+  row.jn = jn;
+}
+
+/// The tangential impulse of `row` becomes right for its normal one.
+/// \param slip that is to vanish \param tired  rows that have changed their mind between sticking and sliding
+/// too often: they slide, since sweeps must end
+template <Real S>
+[[gnu::always_inline]] inline void rubRight(RowLanes<S>& row, const BodyLanes<S>& b1, const BodyLanes<S>& b2,
+                                            const PackedVector<S>& slip,
+                                            const typename Packed<S>::Truth& tired, RowChanges<S>& changes) {
+  using P = Packed<S>;
+  const P zero = P::zero();
+  const P mobility = tangentialMobility(row, b1, b2);
+  const PackedVector<S> wanted = row.jt - reciprocalOf(mobility) * slip;
+  const P size_sq = wanted.squaredNorm();
+  const P most = choose(tired, row.slide, row.stick) * row.jn;
+  changes.rubs = (row.stick > zero) & (mobility > zero) & ((row.jn > zero) | (row.jt.sumAbs() > zero));
+  changes.slides = changes.rubs & (size_sq > most * most);
+  PackedVector<S> jt = choose(changes.rubs, wanted, row.jt);
+  if (changes.slides.any()) {
+    const P kept = row.slide * row.jn / squareRoot(choose(changes.slides, size_sq, P::all(S(1))));
+    jt = choose(changes.slides, kept * wanted, jt);
+  }
+  changes.dt = jt - row.jt;
+  changes.du = mobility * changes.dt;
+  row.jt = jt;
+}
+
+/// The tangential impulse of `row` made to lie across its normal, and in Coulomb's cone.
+template <Real S>
+[[gnu::always_inline]] inline void cutToCone(RowLanes<S>& row, const BodyLanes<S>& b1,
+                                             const BodyLanes<S>& b2) {
+  using P = Packed<S>;
+  const PackedVector<S> none = PackedVector<S>::zero();
+  row.jt = choose(row.jn > P::zero(), row.jt - row.n.dot(row.jt) * row.n, none);
+  RowChanges<S> changes;
+  rubRight(row, b1, b2, none, typename P::Truth(P::zero() > P::zero()), changes);
+  row.jt = choose(changes.rubs, row.jt, none);
+}
+
+/// The impulse j on the second bodies, its opposite on the first.
+template <Real S>
+[[gnu::always_inline]] inline void push(BodyLanes<S>& b1, BodyLanes<S>& b2, const PackedVector<S>& j) {
+  b1.v = b1.v - b1.inverseMass * j;
+  b2.v = b2.v + b2.inverseMass * j;
+}
+/// What its tangential part turns.
+template <Real S>
+[[gnu::always_inline]] inline void twist(const RowLanes<S>& row, BodyLanes<S>& b1, BodyLanes<S>& b2,
+                                         const PackedVector<S>& jt) {
+  const PackedVector<S> turn = row.n.cross(jt);
+  b1.s = b1.s - (row.c1 * b1.spin) * turn;
+  b2.s = b2.s - (row.c2 * b2.spin) * turn;
+}
+
+}  // namespace gravel::detail
