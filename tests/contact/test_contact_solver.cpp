@@ -433,7 +433,8 @@ TEST_CASE("the same contacts once more: right at one look, let go by other force
 }
 
 // Seen to fail: where bodies begin left out of their ways (the pushed body keeps its push); rows that bounced
-// passed over (the ball falls on); the threshold, or a tolerance that became stricter, not asked for (looks).
+// passed over (the ball falls on); the threshold, or a tolerance that became stricter, not asked for (looks);
+// contacts that were passed over and then moved, taken up from the solve before the last one.
 TEST_CASE("the same contacts once more: those between bodies that begin as they did are passed over") {
   const double dt = 1e-3;
   const double g = 9.81;
@@ -501,7 +502,27 @@ TEST_CASE("the same contacts once more: those between bodies that begin as they 
 
     solver.setSettings(settings);
     const Totals before(bodies);
+    std::vector<Vector3<double>> missing;  // of each body's change
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      missing.emplace_back(-Vector3<double>(bodies[i].velocity()));
+    }
     const ContactReport<double> report = solver.solve(bodies, dt);
+    double largest = 0.0;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      missing[i] += bodies[i].velocity();
+      largest = std::max(largest, missing[i].norm());
+    }
+    for (std::size_t k = 0; k < contacts.size(); ++k) {
+      const ContactImpulse<double>& j = solver.impulses()[k];
+      const Vector3<double> push = j.normal * contacts[k].normal + j.tangential;
+      missing[contacts[k].first] += push * bodies[contacts[k].first].inverseMass();
+      if (contacts[k].second != staticPartner) {
+        missing[contacts[k].second] -= push * bodies[contacts[k].second].inverseMass();
+      }
+    }
+    for (const Vector3<double>& rest : missing) {
+      CHECK(rest.norm() <= 1e-10 * largest);  // sweeps and solves round some hundred times
+    }
     CHECK(report.looks >= expected);
     CHECK(report.looks <= most);
     double furthest = 0.0;
@@ -512,6 +533,56 @@ TEST_CASE("the same contacts once more: those between bodies that begin as they 
     CHECK(furthest < 6 * enough);
     CHECK(Totals(bodies).energy <= before.energy);
   }
+}
+
+// Seen to fail: lists that do not change places; the impulse of the ball left as it was, in either list.
+TEST_CASE(
+    "a solve that leaves all impulses as they are has those of a contact by itself anew, and lists both") {
+  const double dt = 1e-3;
+  const double g = 9.81;
+  Bodies<double, SoA> bodies = fourLayers();
+  Body<double> ball;  // alone on the floor
+  ball.radius = 0.5;
+  ball.position = {30, 0, 0.4999};
+  bodies.add(ball);
+  const std::size_t alone = bodies.size() - 1;
+  const auto fall = [&] {
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      bodies[i].acceleration() = Vector3<double>(0, 0, -g);
+      bodies[i].velocity()[2] -= g * dt;
+    }
+  };
+  const auto contacts = contactsOf(bodies, Material<double>{0.0, 0.5, 0.5, 0.0}, floorAtZero<double>());
+  ContactSettings<double> settings;
+  settings.tolerance = 1e-3;
+  settings.maxIterations = 10000;
+  settings.accelerate = false;
+  ContactSolver<double> solver;
+  solver.setSettings(settings);
+  for (int k = 0; k < 40; ++k) {
+    fall();
+    solver.begin(contacts, bodies);
+    solver.solve(bodies, dt);
+  }
+  const std::vector<ContactImpulse<double>> before = solver.copyImpulses();
+  fall();
+  bodies[alone].velocity()[2] -= 0.25 * g * dt;
+  const ContactReport<double> report = solver.solve(bodies, dt);
+  REQUIRE(report.iterations == 1);
+  REQUIRE(report.looks < contacts.size() / 2);
+  const std::vector<ContactImpulse<double>> after = solver.copyImpulses();
+  CHECK(solver.earlierImpulses() == before);
+  std::size_t others = 0;
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    if (contacts[k].first == alone || contacts[k].second == alone) {
+      ++others;
+      CHECK_THAT(before[k].normal, WithinRel(g * dt, 1e-12));
+      CHECK_THAT(after[k].normal, WithinRel(1.25 * g * dt, 1e-12));
+    } else {
+      CHECK(after[k] == before[k]);
+    }
+  }
+  CHECK(others == 1);
 }
 
 TEST_CASE("a blow on a heap at rest: only what it reaches is looked at again, for the same answer") {
@@ -784,7 +855,7 @@ TEST_CASE("a moving partner: friction carries along, and the drift's work closes
 }
 
 // Seen to fail: impulses listed in the order of rows; a list kept from the solve before; what resists turning
-// left out of the list.
+// left out of the list; momentum from impulses that the sweep has changed already.
 TEST_CASE(
     "impulses are listed by contact while contacts stay, go and come, and so are those of the solve before") {
   Bodies<double, SoA> bodies = randomCloud<double>(150, 5.0, 11);
@@ -804,6 +875,9 @@ TEST_CASE(
     return Vector3<double>(d[0], d[1], d[2]);
   };
   ContactSolver<double> solver;
+  ContactSettings<double> settings;
+  settings.accelerate = GENERATE(false, true);
+  solver.setSettings(settings);
   std::vector<ContactImpulse<double>> before;
   for (const ContactList<double>* contacts : {&all, &all, &fewer, &all, &all}) {
     std::vector<Vector3<double>> velocities;

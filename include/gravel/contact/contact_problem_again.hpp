@@ -31,10 +31,15 @@ void ContactProblem<S>::recall(const ContactColoring& colouring) {
 
 template <Real S>
 void ContactProblem<S>::keepLast(const ContactColoring& colouring, detail::ImpulseList<S>& last) {
-  for (std::size_t k = 0; k < colouring.loneCount(); ++k) {
-    last.set(k, impulses_->get(k));
-  }
   passes = false;
+  if (last_ == impulses_) {
+    return;  // they are there
+  }
+  for (std::size_t k = 0; k < colouring.loneCount(); ++k) {
+    const ContactImpulse<S> before = last.get(k);
+    last.set(k, impulses_->get(k));
+    impulses_->set(k, before);
+  }
   std::swap(last, *impulses_);
 }
 

@@ -92,20 +92,30 @@ class ContactSolver {
     goesOn_ = false;
     listed_ = false;
     sameNames_ = !handedOn_;
+    // What was handed on gives way to what is solved, row by row; only momentum asks for it again.
+    const detail::ImpulseList<S>* last = &rowImpulses_;
+    if (sameNames_) {
+      std::swap(before_.impulses(), rowImpulses_);
+      last = &before_.impulses();
+    } else if (settings_.accelerate) {
+      guess_ = rowImpulses_;
+      last = &guess_;
+    }
     handedOn_ = false;
-    std::swap(rowsBefore_, rowImpulses_);
+    kept_ = false;
     if (!contacts.empty()) {
       // Forces that last give impulses in proportion of the steps.
       const S ratio = settings_.warmStart && memoryStep_ > S(0) ? S(dt / memoryStep_) : S(0);
       rowImpulses_.resize(contacts.size(), facts_.kinds.turn);
-      problem_.gather(contacts, bodies, coloring_, dt, settings_, facts_.kinds, rowImpulses_, rowsBefore_,
-                      ratio, fresh_, goesOn && ratio > S(0));
+      problem_.gather(contacts, bodies, coloring_, dt, settings_, facts_.kinds, rowImpulses_, *last, ratio,
+                      fresh_, goesOn && ratio > S(0));
       fresh_ = false;
       if (problem_.active) {
         report = std::visit([&](auto& algorithm) { return algorithm.solve(problem_, coloring_, settings_); },
                             algorithm_);
-        if (problem_.kept) {
-          problem_.keepLast(coloring_, rowsBefore_);
+        kept_ = problem_.kept;
+        if (kept_) {
+          problem_.keepLast(coloring_, before_.impulses());
         }
         energy_.settle(problem_, coloring_, contacts, otherRows_, report);
         otherRows_ = false;
@@ -195,7 +205,17 @@ class ContactSolver {
     return sameNames_ ? names_[k].keys : before_.keys(k);
   }
   std::vector<ContactImpulse<S>> earlierImpulses() const {
-    return sameNames_ ? inOrder(rowsBefore_) : before_.listed();
+    if (!sameNames_) {
+      return before_.listed();
+    }
+    if (!kept_) {
+      return inOrder(before_.impulses());
+    }
+    std::vector<ContactImpulse<S>> same = inOrder(rowImpulses_);
+    for (std::size_t k = 0; k < coloring_.loneCount(); ++k) {
+      same[coloring_.rows()[k].contact] = before_.impulses().get(k);
+    }
+    return same;
   }
 
   /// What the next solve() begins from: the impulses of the last one by keys, and its step [s]. A restart
@@ -225,7 +245,7 @@ class ContactSolver {
   /// \param memory sorted by keys
   void setMemory(const std::vector<StoredImpulse<S>>& memory, const S& step) {
     if (sameNames_) {
-      before_.take(names_, rowsBefore_, coloring_.rows());
+      before_.name(names_, coloring_.rows());
       sameNames_ = false;
     }
     names_.clear();
@@ -280,14 +300,16 @@ class ContactSolver {
   bool inRows_ = true;
   std::vector<ContactImpulse<S>> list_;  ///< of impulses(), if `listed_`
   bool listed_ = false;
-  detail::EarlierImpulses<S> before_;  ///< of the contacts before
-  detail::ImpulseList<S> rowsBefore_;  ///< the same where rows are still the same: `sameNames_`
-  std::vector<Vector3<S>> changes_;    ///< by slot: of workOn()
+  /// Of the solve before, whose contacts have other names unless `sameNames_`.
+  detail::EarlierImpulses<S> before_;
+  detail::ImpulseList<S> guess_;     ///< what was handed on, for sweeps with momentum
+  std::vector<Vector3<S>> changes_;  ///< by slot: of workOn()
   S memoryStep_ = S(0);
   bool handedOn_ = false;   ///< no solve() since
+  bool kept_ = false;       ///< the last solve() left all but lone rows with the impulses of the one before
   bool goesOn_ = false;     ///< the last solve() was of these contacts, where they stand
   bool otherRows_ = true;   ///< than those that `energy_` knows
-  bool sameNames_ = false;  ///< `rowsBefore_` goes with `names_`
+  bool sameNames_ = false;  ///< `before_` goes with `names_` and the present rows
   bool fresh_ = true;       ///< contacts may be elsewhere than at the last gathering
 };
 

@@ -27,14 +27,22 @@ class EarlierImpulses {
   /// of the contacts, sorted \param impulses in the order of `rows`; in that of contacts without rows
   void take(std::vector<ContactName>& names, ImpulseList<S>& impulses,
             std::span<const ContactColoring::Row> rows) {
-    std::swap(names_, names);
     std::swap(impulses_, impulses);
+    name(names, rows);
+  }
+  /// Takes the names of those that are here.
+  void name(std::vector<ContactName>& names, std::span<const ContactColoring::Row> rows) {
+    std::swap(names_, names);
     findRows(rows, rowOf_);
     if (rows.empty()) {
       rowOf_.resize(names_.size());
       std::iota(rowOf_.begin(), rowOf_.end(), 0U);
     }
   }
+
+  /// In the order of the rows that they were solved in.
+  ImpulseList<S>& impulses() { return impulses_; }
+  const ImpulseList<S>& impulses() const { return impulses_; }
 
   const ContactKeys& keys(std::size_t k) const { return names_[k].keys; }
   /// In the order of the keys.

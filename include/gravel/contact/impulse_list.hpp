@@ -20,11 +20,16 @@ class ImpulseList {
  public:
   std::size_t size() const { return pushes_.size(); }
 
-  /// As many, of any value. \param turns whether any of them resists rolling or spinning
+  /// As many, of any value; what is there stays if it is as many. \param turns whether any of them resists
+  /// rolling or spinning: none so far, if none did
   void resize(std::size_t count, bool turns) {
     resizeSparingly(pushes_, count);
     resizeSparingly(impacts_, count);
-    resizeSparingly(turning_, turns ? count : 0);
+    if (!turns) {
+      turning_.clear();
+    } else if (turning_.size() != count) {
+      turning_.assign(count, Vector3<S>::Zero());
+    }
   }
 
   /// As many, all zero.

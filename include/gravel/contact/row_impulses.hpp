@@ -79,6 +79,42 @@ struct RowImpulses {
     const Vector3<S> change = dl / row.mass;
     return {change.squaredNorm(), change.dot(row.step), change.dot(dl)};
   }
+
+  /// Takes down how far bodies were moved at most.
+  static void watchMoves(ContactProblem<S>& problem, const typename Group::Index& slots,
+                         const BodyLanes<S>& bodies, const Packed<S>& ways) {
+    for (std::size_t lane = 0; lane < Group::width; ++lane) {
+      if (bodies.inverseMass[lane] > S(0)) {
+        problem.watch.move(slots[lane], ways[lane]);
+      }
+    }
+  }
+
+  /// Resistance to turning of the rows of a group, which are relaxed otherwise.
+  template <bool Watched>
+  static void resistAll(ContactProblem<S>& problem, const Group& group, const S& beta, Progress& progress) {
+    using std::sqrt;
+    for (std::size_t lane = 0; lane < group.count; ++lane) {
+      const std::uint32_t k = group.row[lane];
+      Body& b1 = problem.bodies[group.slot1[lane]];
+      Body& b2 = problem.bodies[group.slot2[lane]];
+      TurningRow<S>& row = problem.turning[k];
+      row.step *= Watched ? S(0) : beta;
+      row.l += row.step;
+      const Progress resisted = resist(problem, k, b1, b2);
+      if constexpr (Watched) {
+        const S l = row.mass * S(sqrt(resisted.change_sq));
+        if (b1.inverseMass > S(0)) {
+          problem.watch.move(group.slot1[lane], row.q1 * b1.spin * l);
+        }
+        if (b2.inverseMass > S(0)) {
+          problem.watch.move(group.slot2[lane], row.q2 * b2.spin * l);
+        }
+        progress.changed += resisted.change_sq > problem.watch.still() * problem.watch.still() ? 1U : 0U;
+      }
+      progress += resisted;
+    }
+  }
 };
 
 }  // namespace gravel::detail

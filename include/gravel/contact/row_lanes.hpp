@@ -59,7 +59,7 @@ template <Real S, class T>
   return reinterpret_cast<Plain*>(&object) + 4 * number;
 }
 
-/// SolverBody or SolverStart, of whose scalars the fourth and the eighth are `third` and `seventh` there.
+/// SolverBody; or SolverStart, whose falls and radii then stand in place of inverse masses and spins.
 template <Real S>
 struct BodyLanes {
   PackedVector<S> v;

@@ -30,6 +30,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
   using Base::mark;
   using Base::resist;
   using Base::rub;
+  using Base::watchMoves;
   using typename Base::Body;
   using typename Base::Group;
   using typename Base::Lanes;
@@ -293,7 +294,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       watchMoves(problem, group.slot2, b2, b2.inverseMass * push + row.c2 * b2.spin * push_t);
     }
     if (!problem.turning.empty()) {
-      resistAll<Watched>(problem, group, beta, progress);
+      Base::template resistAll<Watched>(problem, group, beta, progress);
     }
     if constexpr (Watched) {
       const S still_sq = problem.watch.still() * problem.watch.still();
@@ -303,41 +304,6 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       }
     }
     sum += progress;
-  }
-
-  static void watchMoves(ContactProblem<S>& problem, const typename Group::Index& slots,
-                         const detail::BodyLanes<S>& bodies, const Pack& ways) {
-    for (std::size_t lane = 0; lane < Group::width; ++lane) {
-      if (bodies.inverseMass[lane] > S(0)) {
-        problem.watch.move(slots[lane], ways[lane]);
-      }
-    }
-  }
-
-  /// Resistance to turning of the rows of a group, which are relaxed otherwise.
-  template <bool Watched>
-  static void resistAll(ContactProblem<S>& problem, const Group& group, const S& beta, Progress& progress) {
-    using std::sqrt;
-    for (std::size_t lane = 0; lane < group.count; ++lane) {
-      const std::uint32_t k = group.row[lane];
-      Body& b1 = problem.bodies[group.slot1[lane]];
-      Body& b2 = problem.bodies[group.slot2[lane]];
-      detail::TurningRow<S>& row = problem.turning[k];
-      row.step *= Watched ? S(0) : beta;
-      row.l += row.step;
-      const Progress resisted = resist(problem, k, b1, b2);
-      if constexpr (Watched) {
-        const S l = row.mass * S(sqrt(resisted.change_sq));
-        if (b1.inverseMass > S(0)) {
-          problem.watch.move(group.slot1[lane], row.q1 * b1.spin * l);
-        }
-        if (b2.inverseMass > S(0)) {
-          problem.watch.move(group.slot2[lane], row.q2 * b2.spin * l);
-        }
-        progress.changed += resisted.change_sq > problem.watch.still() * problem.watch.still() ? 1U : 0U;
-      }
-      progress += resisted;
-    }
   }
 
   std::vector<BodyStep> bodySteps_;

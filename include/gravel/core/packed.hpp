@@ -6,33 +6,13 @@
 /// Vector extensions of g++ and clang, which make of them whatever the target has; types that are not built
 /// in, and long double, go one by one through the same code.
 
-#include <gravel/core/types.hpp>
+#include <gravel/core/short_vectors.hpp>
 
 #include <algorithm>
 #include <array>
 #include <cstring>
 
 namespace gravel::detail {
-
-template <class S>
-inline constexpr bool isPackable = std::is_same_v<S, float> || std::is_same_v<S, double>;
-
-/// How many numbers are one Packed.
-template <class S>
-inline constexpr std::size_t packWidth = isPackable<S> ? 4 : 1;
-
-template <class S>
-struct PackedRaw {
-  using Type = S;
-  using Truth = bool;
-};
-template <class S>
-  requires isPackable<S>
-struct PackedRaw<S> {
-  using Whole = std::conditional_t<sizeof(S) == 8, std::int64_t, std::int32_t>;
-  typedef S Type __attribute__((vector_size(4 * sizeof(S))));
-  typedef Whole Truth __attribute__((vector_size(4 * sizeof(S))));
-};
 
 /// A truth for each number.
 template <class S>
@@ -77,17 +57,15 @@ struct Packed {
 
   /// The same number in every lane.
   [[gnu::always_inline]] static inline Packed all(const S& x) {
-    if constexpr (isPackable<S>) {
-      return {Raw{x, x, x, x}};
-    } else {
-      return {x};
-    }
+    return of([&](std::size_t) { return x; });
   }
   [[gnu::always_inline]] static inline Packed zero() { return all(S(0)); }
   /// f(lane) in each.
   template <class F>
   [[gnu::always_inline]] static inline Packed of(F&& f) {
-    if constexpr (isPackable<S>) {
+    if constexpr (isPaired<S>) {
+      return {Raw{{f(0), f(1)}, {f(2), f(3)}}};
+    } else if constexpr (isPackable<S>) {
       return {Raw{f(0), f(1), f(2), f(3)}};
     } else {
       return {S(f(0))};
@@ -135,7 +113,11 @@ struct Packed {
   [[gnu::always_inline]] friend inline Truth operator<(const Packed& a, const Packed& b) { return b > a; }
   /// a where it is true, else b; both are found.
   [[gnu::always_inline]] friend inline Packed choose(const Truth& truth, const Packed& a, const Packed& b) {
-    return {truth.m ? a.v : b.v};
+    if constexpr (isPaired<S>) {
+      return {{truth.m.low ? a.v.low : b.v.low, truth.m.high ? a.v.high : b.v.high}};
+    } else {
+      return {truth.m ? a.v : b.v};
+    }
   }
   [[gnu::always_inline]] friend inline Packed largerOf(const Packed& a, const Packed& b) {
     return choose(a < b, b, a);
@@ -163,19 +145,6 @@ struct Packed {
     return choose(positive, all(S(1)) / choose(positive, a, all(S(1))), zero());
   }
 };
-
-/// Four vectors of which each was from another source, and back.
-template <class Raw>
-[[gnu::always_inline]] inline void transpose(Raw& q0, Raw& q1, Raw& q2, Raw& q3) {
-  const Raw a = __builtin_shufflevector(q0, q1, 0, 4, 2, 6);
-  const Raw b = __builtin_shufflevector(q0, q1, 1, 5, 3, 7);
-  const Raw c = __builtin_shufflevector(q2, q3, 0, 4, 2, 6);
-  const Raw d = __builtin_shufflevector(q2, q3, 1, 5, 3, 7);
-  q0 = __builtin_shufflevector(a, c, 0, 1, 4, 5);
-  q1 = __builtin_shufflevector(b, d, 0, 1, 4, 5);
-  q2 = __builtin_shufflevector(a, c, 2, 3, 6, 7);
-  q3 = __builtin_shufflevector(b, d, 2, 3, 6, 7);
-}
 
 /// Four numbers that stand one after the other in memory, a vector and one more, of packWidth<S> sources.
 template <class S>
