@@ -29,8 +29,8 @@ inline constexpr bool isPaired = std::is_same_v<S, double>;
 template <class S, std::size_t count>
 struct VectorOf {
   using Whole = std::conditional_t<sizeof(S) == 8, std::int64_t, std::int32_t>;
-  typedef S Type __attribute__((vector_size(count * sizeof(S))));
-  typedef Whole Truth __attribute__((vector_size(count * sizeof(S))));
+  using Type __attribute__((vector_size(count * sizeof(S)))) = S;
+  using Truth __attribute__((vector_size(count * sizeof(S)))) = Whole;
 };
 
 /// Two short vectors that count as one.
