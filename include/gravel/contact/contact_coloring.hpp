@@ -217,16 +217,6 @@ T sumOverColourParts(const ContactColoring& colouring, const T& zero, F&& f) {
   return sum;
 }
 
-/// f(k, sum) for each row of a part.
-template <class F>
-auto eachRow(F&& f) {
-  return [&f](std::size_t begin, std::size_t end, auto& sum) {
-    for (std::size_t k = begin; k < end; ++k) {
-      f(k, sum);
-    }
-  };
-}
-
 }  // namespace detail
 
 }  // namespace gravel

@@ -48,6 +48,7 @@ class ContactEnergy {
   using Pack = detail::Packed<S>;
   using Group = detail::RowGroup<S>;
   using Lanes = detail::RowLanes<S>;
+  using BodyLanes = detail::BodyLanes<S>;
   /// Losses along the normal and across it, work of drift, sum of the contacts' terms that are gains.
   using Sums = Eigen::Array<S, 4, 1>;
   static constexpr std::size_t chunk = 512;
@@ -67,33 +68,32 @@ class ContactEnergy {
     S beta = S(1);
   };
 
-  /// J_n v_n, and J_t.v_t with what turns, at the velocities in `bodies`, which are b1 and b2.
-  template <class B>
-  [[gnu::always_inline]] static inline std::array<Pack, 2> power(
-      const ContactProblem<S>& problem, const Group& group, const Lanes& row, const std::vector<B>& bodies,
-      const detail::BodyLanes<S>& b1, const detail::BodyLanes<S>& b2, const detail::PackedVector<S>& drift) {
+  /// J_n v_n, and J_t.v_t with what turns, at the velocities of b1 and b2.
+  [[gnu::always_inline]] static inline std::array<Pack, 2> power(const ContactProblem<S>& problem,
+                                                                 const Group& group, const Lanes& row,
+                                                                 const BodyLanes& b1, const BodyLanes& b2,
+                                                                 const detail::PackedVector<S>& drift) {
     const detail::PackedVector<S> v_rel = b2.v - b1.v + drift;
     const Pack v_n = row.n.dot(v_rel);
     Pack across = row.jt.dot(slipVelocity(row, v_rel, v_n, b1, b2));
     if (!problem.turning.empty()) {
       across = across + Pack::of([&](std::size_t lane) {
                  const detail::TurningRow<S>& turning = problem.turning[group.row[lane]];
-                 return S(turning.l.dot(turning.rho(bodies[group.slot1[lane]], bodies[group.slot2[lane]])));
+                 return S(turning.l.dot(turning.q2 * b2.s.at(lane) - turning.q1 * b1.s.at(lane)));
                });
     }
     return {row.jn * v_n, across};
   }
 
-  /// The means of the bodies' velocities before and after.
-  void findMeans(const ContactProblem<S>& problem) {
-    detail::resizeAnew(means_, problem.bodies.size());
-    parallelFor(means_.size(), chunk, [&](std::size_t slot) {
-      const auto& before = problem.initial[slot];
-      Body& mean = means_[slot];
-      mean = problem.bodies[slot];
-      mean.v = (before.v + mean.v) / S(2);
-      mean.s = (before.s + mean.s) / S(2);
-    });
+  /// Bodies with the means of their velocities before and after.
+  [[gnu::always_inline]] static inline BodyLanes means(const ContactProblem<S>& problem,
+                                                       const typename Group::Index& slots) {
+    const BodyLanes before = BodyLanes::load(problem.initial, slots);
+    BodyLanes mean = BodyLanes::load(problem.bodies, slots);
+    const Pack half = Pack::all(S(1) / S(2));
+    mean.v = half * (before.v + mean.v);
+    mean.s = half * (before.s + mean.s);
+    return mean;
   }
 
   static detail::PackedVector<S> driftOf(const ContactProblem<S>& problem, const ContactColoring& colouring,
@@ -111,24 +111,26 @@ class ContactEnergy {
 
   Sums takeDown(ContactProblem<S>& problem, const ContactColoring& colouring,
                 const ContactView<S>& contacts) {
-    findMeans(problem);
     return orderedSum(
         problem.rows.size(), chunk, Sums(Sums::Zero()), [&](std::size_t begin, std::size_t end) {
           Sums sums = Sums::Zero();
-          forGroups(colouring, begin, end,
+          forGroups(problem, colouring, begin, end,
                     [&](const Group& group) { sums += takeDown(problem, colouring, contacts, group); });
           return sums;
         });
   }
 
   template <class F>
-  void forGroups(const ContactColoring& colouring, std::size_t begin, std::size_t end, F&& f) {
+  static void forGroups(const ContactProblem<S>& problem, const ContactColoring& colouring, std::size_t begin,
+                        std::size_t end, F&& f) {
     for (std::size_t k = begin; k < end; k += Group::width) {
       const std::size_t from = k + ContactProblem<S>::lookAhead;
       for (std::size_t later = from; later < std::min(from + Group::width, colouring.rows().size());
            ++later) {
-        detail::prefetch(means_[colouring.rows()[later].slot1]);
-        detail::prefetch(means_[colouring.rows()[later].slot2]);
+        for (const std::uint32_t slot : {colouring.rows()[later].slot1, colouring.rows()[later].slot2}) {
+          detail::prefetch(problem.bodies[slot]);
+          detail::prefetch(problem.initial[slot]);
+        }
       }
       f(Group::from(colouring.rows(), k, end, colouring.staticSlot()));
     }
@@ -138,8 +140,8 @@ class ContactEnergy {
                                  const ContactView<S>& contacts, const Group& group) {
     const Pack zero = Pack::zero();
     Lanes row = problem.load(group, !problem.passes);
-    const auto b1 = detail::BodyLanes<S>::load(means_, group.slot1);
-    const auto b2 = detail::BodyLanes<S>::load(means_, group.slot2);
+    const BodyLanes b1 = means(problem, group.slot1);
+    const BodyLanes b2 = means(problem, group.slot2);
     const auto pushes = (row.jn > zero) & (normalMobility(b1, b2) > zero);
     row.jn = choose(pushes, row.jn, zero);
     row.jt = choose(pushes, row.jt, detail::PackedVector<S>::zero());
@@ -155,7 +157,7 @@ class ContactEnergy {
       }
     }
     const detail::PackedVector<S> drift = driftOf(problem, colouring, contacts, group);
-    const auto [normal, across] = power(problem, group, row, means_, b1, b2, drift);
+    const auto [normal, across] = power(problem, group, row, b1, b2, drift);
     const Pack term = normal + across;
     for (std::size_t lane = 0; lane < group.count; ++lane) {
       terms_[group.row[lane]] = term[lane];
@@ -188,12 +190,11 @@ class ContactEnergy {
     if (any) {
       problem.watch.setHolds(false);  // of what comes now
       islands_.assign(gains_.size(), Island{});
-      forGroups(colouring, 0, problem.rows.size(), [&](const Group& group) {
+      forGroups(problem, colouring, 0, problem.rows.size(), [&](const Group& group) {
         const Lanes row = problem.load(group, true);
-        const auto [normal, across] = power(problem, group, row, problem.initial,
-                                            detail::BodyLanes<S>::load(problem.initial, group.slot1),
-                                            detail::BodyLanes<S>::load(problem.initial, group.slot2),
-                                            driftOf(problem, colouring, contacts, group));
+        const auto [normal, across] = power(
+            problem, group, row, BodyLanes::load(problem.initial, group.slot1),
+            BodyLanes::load(problem.initial, group.slot2), driftOf(problem, colouring, contacts, group));
         const Pack term = normal + across;
         for (std::size_t lane = 0; lane < group.count; ++lane) {
           if (row.jn[lane] > S(0)) {
@@ -297,9 +298,8 @@ class ContactEnergy {
         std::min(i, j);  // slots are numbered by ids: the same whatever the indices
   }
 
-  std::vector<Body> means_;  ///< by slot
-  std::vector<S> terms_;     ///< J.(u^- + u^+)/2 by row
-  bool known_ = false;       ///< the islands are of these rows
+  std::vector<S> terms_;  ///< J.(u^- + u^+)/2 by row
+  bool known_ = false;    ///< the islands are of these rows
   std::vector<std::uint32_t> islandOfSlot_;
   std::vector<std::uint32_t> islandOfRow_;
   std::vector<std::vector<Run>> runs_;  ///< of rows

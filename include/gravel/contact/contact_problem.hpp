@@ -17,7 +17,7 @@ namespace gravel {
 template <Real S>
 class ContactProblem : public detail::ProblemBodies<S> {
   using Base = detail::ProblemBodies<S>;
-  using Base::accelerations_;
+  using Base::accelerationOf;
   using Base::chunk;
   using Base::gatherBodies;
   using Base::restart;
@@ -73,23 +73,6 @@ class ContactProblem : public detail::ProblemBodies<S> {
     for (std::size_t k = begin; k < end; k += Group::width) {
       fetch(colouring, k + lookAhead);
       f(Group::from(colouring.rows(), k, end, colouring.staticSlot()));
-    }
-  }
-
-  /// The same for those rows k of which `wanted(k)`.
-  template <class Wanted, class F>
-  static void forGroupsOf(const ContactColoring& colouring, std::size_t begin, std::size_t end,
-                          Wanted&& wanted, F&& f) {
-    Group group;
-    for (std::size_t k = begin; k < end; ++k) {
-      if (wanted(k)) {
-        group.add(colouring.rows(), k);
-      }
-      if (group.count == Group::width || (k + 1 == end && group.count > 0)) {
-        group.fill(colouring.staticSlot());
-        f(group);
-        group.count = 0;
-      }
     }
   }
 
@@ -191,8 +174,10 @@ class ContactProblem : public detail::ProblemBodies<S> {
 
  private:
   /// What rows are taken up from.
+  template <class B>
   struct Taking {
     const ContactView<S>& contacts;
+    const B& source;
     const ContactColoring& colouring;
     const S& dt;
     const ContactSettings<S>& settings;
@@ -217,12 +202,12 @@ class ContactProblem : public detail::ProblemBodies<S> {
   enum class RowRest : std::uint8_t { Not, Free, Loaded };
 
   /// Takes up those rows but the lone ones of which `wanted(k, most)`, without a guess: their bodies have it.
-  template <class Wanted>
-  Most lookAtRows(const Taking& taking, Wanted&& wanted) {
+  template <class B, class Wanted>
+  Most lookAtRows(const Taking<B>& taking, Wanted&& wanted) {
     const ContactColoring& colouring = taking.colouring;
     return detail::sumOverParts(colouring.loneCount(), rows.size(), Most{},
                                 [&](std::size_t begin, std::size_t end, Most& part) {
-                                  forGroupsOf(
+                                  detail::forGroupsOf<S>(
                                       colouring, begin, end, [&](std::size_t k) { return wanted(k, part); },
                                       [&](const Group& group) {
                                         Lanes row = take(taking, group, part);
@@ -249,37 +234,46 @@ class ContactProblem : public detail::ProblemBodies<S> {
   }
 
   /// Brings nearer what rows from k on are taken up from.
-  [[gnu::always_inline]] inline void fetch(const Taking& taking, std::size_t k) const;
+  template <class B>
+  [[gnu::always_inline]] inline void fetch(const Taking<B>& taking, std::size_t k) const;
 
   /// Takes up rows without an impulse.
-  [[gnu::always_inline]] inline Lanes take(const Taking& taking, const Group& group, Most& most);
+  template <class B>
+  [[gnu::always_inline]] inline Lanes take(const Taking<B>& taking, const Group& group, Most& most);
 
   /// All rows but the lone ones after a restart, with the targets they have.
-  void fillAll(const Taking& taking);
+  template <class B>
+  void fillAll(const Taking<B>& taking);
 
-  static const Contact<S>& contactOf(const Taking& taking, const Group& group, std::size_t lane) {
+  template <class B>
+  static const Contact<S>& contactOf(const Taking<B>& taking, const Group& group, std::size_t lane) {
     return taking.contacts[taking.colouring.rows()[group.row[lane]].contact];
   }
 
   /// What stays while bodies and surfaces stay.
-  [[gnu::always_inline]] inline Lanes rowsOf(const Taking& taking, const Group& group, const Pack& radius1,
+  template <class B>
+  [[gnu::always_inline]] inline Lanes rowsOf(const Taking<B>& taking, const Group& group, const Pack& radius1,
                                              const Pack& radius2);
 
   /// What the present velocities ask for. \param b1,b2 of `initial`: falls and radii in place of inverse
   /// masses and spins
   /// \return the largest change of a normal velocity
-  [[gnu::always_inline]] inline S aim(const Taking& taking, const Group& group, Lanes& row,
+  template <class B>
+  [[gnu::always_inline]] inline S aim(const Taking<B>& taking, const Group& group, Lanes& row,
                                       const detail::BodyLanes<S>& b1, const detail::BodyLanes<S>& b2);
 
   /// Target of a row that may be faster than what rests.
-  S rebound(const Taking& taking, const Group& group, std::size_t lane, const Vector3<S>& n, const S& v_n,
+  template <class B>
+  S rebound(const Taking<B>& taking, const Group& group, std::size_t lane, const Vector3<S>& n, const S& v_n,
             const S& allowed, S pull);
 
-  Vector3<S> driftOf(const Taking& taking, const Group& group, std::size_t lane) const {
+  template <class B>
+  Vector3<S> driftOf(const Taking<B>& taking, const Group& group, std::size_t lane) const {
     return speedIn(taking.contacts.drift(contactOf(taking, group, lane)));
   }
 
-  void aimSlip(const Taking& taking, const Group& group, std::size_t lane, const Lanes& rowLanes,
+  template <class B>
+  void aimSlip(const Taking<B>& taking, const Group& group, std::size_t lane, const Lanes& rowLanes,
                const S& drift_n);
 
   /// Begins with the first guess of rows whose bodies have it already.

@@ -34,7 +34,7 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   passes = again && watch.holds() && sameScales_ && ratio == S(1) && turning.empty() && slipTargets.empty() &&
            !drifting && !this->isScaled() && settings.restitutionThreshold == threshold_;
   threshold_ = settings.restitutionThreshold;
-  const Taking taking{contacts, colouring, dt, settings, fresh};
+  const Taking<B> taking{contacts, source, colouring, dt, settings, fresh};
   Most most = detail::sumOverParts(
       0, colouring.loneCount(), Most{}, [&](std::size_t begin, std::size_t end, Most& part) {
         forGroups(colouring, begin, end, [&](const Group& group) { put(group, take(taking, group, part)); });
@@ -87,7 +87,8 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
 }
 
 template <Real S>
-inline void ContactProblem<S>::fetch(const Taking& taking, std::size_t k) const {
+template <class B>
+inline void ContactProblem<S>::fetch(const Taking<B>& taking, std::size_t k) const {
   for (const std::size_t end = std::min(k + Group::width, rows.size()); k < end; ++k) {
     __builtin_prefetch(last_->quad(k));
     const ContactColoring::Row& place = taking.colouring.rows()[k];
@@ -100,7 +101,8 @@ inline void ContactProblem<S>::fetch(const Taking& taking, std::size_t k) const 
 }
 
 template <Real S>
-inline auto ContactProblem<S>::take(const Taking& taking, const Group& group, Most& most) -> Lanes {
+template <class B>
+inline auto ContactProblem<S>::take(const Taking<B>& taking, const Group& group, Most& most) -> Lanes {
   const auto b1 = detail::BodyLanes<S>::load(initial, group.slot1);
   const auto b2 = detail::BodyLanes<S>::load(initial, group.slot2);
   Lanes row = taking.fresh ? rowsOf(taking, group, b1.spin, b2.spin) : Lanes::load(rows, group);
@@ -115,7 +117,8 @@ inline auto ContactProblem<S>::take(const Taking& taking, const Group& group, Mo
 }
 
 template <Real S>
-void ContactProblem<S>::fillAll(const Taking& taking) {
+template <class B>
+void ContactProblem<S>::fillAll(const Taking<B>& taking) {
   forGroups(taking.colouring, taking.colouring.loneCount(), rows.size(), [&](const Group& group) {
     const Pack radius1 = detail::BodyLanes<S>::load(initial, group.slot1).spin;
     const Pack radius2 = detail::BodyLanes<S>::load(initial, group.slot2).spin;
@@ -126,7 +129,8 @@ void ContactProblem<S>::fillAll(const Taking& taking) {
 }
 
 template <Real S>
-inline auto ContactProblem<S>::rowsOf(const Taking& taking, const Group& group, const Pack& radius1,
+template <class B>
+inline auto ContactProblem<S>::rowsOf(const Taking<B>& taking, const Group& group, const Pack& radius1,
                                       const Pack& radius2) -> Lanes {
   for (std::size_t lane = 0; lane < group.count; ++lane) {
     gaps_[group.row[lane]] = contactOf(taking, group, lane).gap;
@@ -150,7 +154,8 @@ inline auto ContactProblem<S>::rowsOf(const Taking& taking, const Group& group, 
 }
 
 template <Real S>
-inline S ContactProblem<S>::aim(const Taking& taking, const Group& group, Lanes& row,
+template <class B>
+inline S ContactProblem<S>::aim(const Taking<B>& taking, const Group& group, Lanes& row,
                                 const detail::BodyLanes<S>& b1, const detail::BodyLanes<S>& b2) {
   const Pack zero = Pack::zero();
   const Pack falls = b1.inverseMass + b2.inverseMass;
@@ -201,11 +206,15 @@ inline S ContactProblem<S>::aim(const Taking& taking, const Group& group, Lanes&
 }
 
 template <Real S>
-S ContactProblem<S>::rebound(const Taking& taking, const Group& group, std::size_t lane, const Vector3<S>& n,
-                             const S& v_n, const S& allowed, S pull) {
+template <class B>
+S ContactProblem<S>::rebound(const Taking<B>& taking, const Group& group, std::size_t lane,
+                             const Vector3<S>& n, const S& v_n, const S& allowed, S pull) {
   const std::uint32_t k = group.row[lane];
   const S speed = detail::sizeOf<S>(v_n);
-  const S a_n = n.dot(Vector3<S>(accelerations_[group.slot2[lane]] - accelerations_[group.slot1[lane]]));
+  const auto accelerationAt = [&](std::uint32_t slot) {
+    return Base::accelerationOf(taking.source, taking.colouring, slot);
+  };
+  const S a_n = n.dot(Vector3<S>(accelerationAt(group.slot2[lane]) - accelerationAt(group.slot1[lane])));
   pull = std::max<S>(pull, S(2) * detail::sizeOf<S>(a_n));
   const bool fast = speed > speedIn(S(taking.settings.restitutionThreshold + pull * taking.dt));
   const bool impact = v_n < S(0) && fast && speed > allowed;
@@ -224,7 +233,8 @@ S ContactProblem<S>::rebound(const Taking& taking, const Group& group, std::size
 }
 
 template <Real S>
-void ContactProblem<S>::aimSlip(const Taking& taking, const Group& group, std::size_t lane,
+template <class B>
+void ContactProblem<S>::aimSlip(const Taking<B>& taking, const Group& group, std::size_t lane,
                                 const Lanes& rowLanes, const S& drift_n) {
   const std::uint32_t k = group.row[lane];
   Row row;

@@ -28,7 +28,8 @@ struct NarrowPhaseSettings {
   Scalar step = Scalar(0);
   /// Who rests on whom, sorted: only these stay contacts with a gap. Without it every pair so near does.
   std::optional<std::span<const ContactName>> resting = std::nullopt;
-  std::span<const ContactName> before{};  ///< with which those found are compared: facts()
+  std::span<const ContactKeys> settled{};  ///< more of these, sorted
+  std::span<const ContactName> before{};   ///< with which those found are compared: facts()
 };
 
 namespace detail {
@@ -68,7 +69,8 @@ bool mayRest(const NarrowPhaseSettings<S>& settings, const ContactKeys& keys, Re
   const std::span<const ContactName> resting = *settings.resting;
   const auto found = placeOf(resting, keys, cursor);
   cursor = static_cast<std::size_t>(found - resting.begin());
-  return found != resting.end() && found->keys == keys;
+  return (found != resting.end() && found->keys == keys) ||
+         std::binary_search(settings.settled.begin(), settings.settled.end(), keys);
 }
 
 template <Real S>

@@ -5,8 +5,8 @@
 
 #include <gravel/contact/contact_coloring.hpp>
 #include <gravel/contact/contact_facts.hpp>
+#include <gravel/contact/overlap_lanes.hpp>
 #include <gravel/contact/row_watch.hpp>
-#include <gravel/contact/solver_rows.hpp>
 #include <gravel/core/memory.hpp>
 #include <gravel/core/parallel.hpp>
 
@@ -83,19 +83,18 @@ class PositionalCorrection {
     parallelFor(contacts.size(), chunk,
                 [&](std::size_t k) { watch_.enterFirst(k, deep_[colouring.rows()[k].contact] == 0); });
     do {
-      // Lone contacts are right after one sweep.
-      const auto one = [&](std::size_t k, Opened& sum) {
-        const ContactColoring::Row& place = colouring.rows()[k];
-        if (!watch_.isStale(k, place.slot1, place.slot2)) {
-          return;
-        }
-        open(rowOf(contacts[place.contact], place, bodies, settings), place, settings.keepAngularMomentum,
-             sum);
-        watch_.enter(k, place.slot1, place.slot2);
+      const auto open = [&](std::size_t begin, std::size_t end, Opened& sum) {
+        const auto stale = [&](std::size_t k) {
+          const ContactColoring::Row& place = colouring.rows()[k];
+          return watch_.isStale(k, place.slot1, place.slot2);
+        };
+        detail::forGroupsOf<S>(colouring, begin, end, stale, [&](const Group& group) {
+          openAll(contacts, colouring, group, settings, sum);
+        });
       };
-      const auto each = detail::eachRow(one);
-      Opened opened = detail::sumOverParts(0, colouring.loneCount(), Opened{}, each);
-      opened += detail::sumOverColourParts(colouring, Opened{}, each);
+      // Lone contacts are right after one sweep.
+      Opened opened = detail::sumOverParts(0, colouring.loneCount(), Opened{}, open);
+      opened += detail::sumOverColourParts(colouring, Opened{}, open);
       report.residual = opened.largest;
       report.loss += opened.loss;
       ++report.iterations;
@@ -108,19 +107,9 @@ class PositionalCorrection {
   const std::vector<Displacement<S>>& displacements() const { return moved_; }
 
  private:
-  struct Shift {
-    Vector3<S> d;
-    S mass;  ///< 0 for immovable
-    Vector3<S> v;
-    Vector3<S> dv;  ///< that v was changed by
-  };
-  struct Row {
-    Vector3<S> n;  ///< from the first centre to the second at detection
-    S distance;    ///< of the centres then; < 0 to a boundary
-    S reach;       ///< distance at which the overlap is what shall remain; to a boundary the way to there
-    S share1;
-    S share2;
-  };
+  using Group = detail::RowGroup<S>;
+  using Body = detail::ShiftedBody<S>;
+  using Bodies = detail::ShiftedLanes<S>;
   static constexpr std::size_t chunk = 512;
 
   /// What a sweep did.
@@ -137,14 +126,14 @@ class PositionalCorrection {
   template <class B>
   void takeUp(const ContactColoring& colouring, const B& bodies) {
     const std::size_t n = colouring.bodies().size();
-    shifts_.resize(n + 1);
-    parallelFor(n + 1, chunk, [&](std::size_t slot) {
+    detail::resizeAnew(shifts_, n + 1);
+    parallelFor(n, chunk, [&](std::size_t slot) {
       const bool movable = colouring.movable(static_cast<std::uint32_t>(slot));
-      const std::uint32_t i = movable ? colouring.bodies()[slot] : 0;
-      shifts_[slot] = {Vector3<S>::Zero(), movable ? S(bodies.masses()[i]) : S(0),
-                       movable ? Vector3<S>(bodies.velocities()[i]) : Vector3<S>(Vector3<S>::Zero()),
-                       Vector3<S>::Zero()};
+      const std::uint32_t i = colouring.bodies()[slot];
+      shifts_[slot] = {Vector3<S>::Zero(), movable ? S(bodies.masses()[i]) : S(0), bodies.velocities()[i],
+                       bodies.radii()[i]};
     });
+    shifts_[n] = {Vector3<S>::Zero(), S(0), Vector3<S>::Zero(), S(0)};
   }
 
   /// Of each part of the slots first how many moved, and so where they stand in the list.
@@ -169,75 +158,44 @@ class PositionalCorrection {
           const std::uint32_t i = colouring.bodies()[slot];
           positions[i] += shifts_[slot].d;
           moved_[place++] = {i, shifts_[slot].d};
-          if (shifts_[slot].dv != Vector3<S>::Zero()) {
-            velocities[i] += shifts_[slot].dv;
+          if (shifts_[slot].v != velocities[i]) {
+            velocities[i] = shifts_[slot].v;
           }
         }
       }
     });
   }
 
-  /// Made where it is needed: most contacts are never opened, or once.
-  template <class B>
-  Row rowOf(const Contact<S>& c, const ContactColoring::Row& place, const B& bodies,
-            const CorrectionSettings<S>& settings) const {
-    const S overlap = -c.gap;
-    const S kept =
-        std::max<S>(overlap - settings.cap * detail::smallerRadius(c, bodies),
-                    std::max<S>((S(1) - settings.factor) * overlap, std::min<S>(settings.slop, overlap)));
-    const S m1 = shifts_[place.slot1].mass;
-    const S m2 = shifts_[place.slot2].mass;
-    const MassShares<S> shares = massShares<S>(m1, m1 > S(0), m2, m2 > S(0));
-    const bool boundary = c.second == staticPartner;
-    const S distance = boundary ? S(0) : c.arm1 + c.arm2;
-    return {c.normal, boundary ? S(-1) : distance, S(distance - c.gap - kept), shares.first, shares.second};
+  /// Opens the contacts of these rows.
+  [[gnu::flatten]] void openAll(std::span<const Contact<S>> contacts, const ContactColoring& colouring,
+                                const Group& group, const CorrectionSettings<S>& settings, Opened& sum) {
+    using Pack = detail::Packed<S>;
+    const Pack zero = Pack::zero();
+    const auto contact = detail::OverlapLanes<S>::load(contacts, colouring.rows(), group);
+    Bodies b1 = Bodies::load(shifts_, group.slot1);
+    Bodies b2 = Bodies::load(shifts_, group.slot2);
+    const Pack smaller = choose((b1.radius > zero) & (b2.radius > zero), smallerOf(b1.radius, b2.radius),
+                                largerOf(b1.radius, b2.radius));
+    const Pack overlap = -contact.gap;
+    const Pack kept = largerOf(
+        overlap - Pack::all(settings.cap) * smaller,
+        largerOf(Pack::all(S(1) - settings.factor) * overlap, smallerOf(Pack::all(settings.slop), overlap)));
+    const detail::OpenedLanes<S> opened = openTo(contact, kept, b1, b2, settings.keepAngularMomentum);
+    b1.store(shifts_, group.slot1, settings.keepAngularMomentum);
+    b2.store(shifts_, group.slot2, settings.keepAngularMomentum);
+    for (std::size_t lane = 0; lane < group.count; ++lane) {
+      if (opened.way1[lane] > S(0)) {
+        watch_.move(group.slot1[lane], opened.way1[lane]);
+      }
+      if (opened.way2[lane] > S(0)) {
+        watch_.move(group.slot2[lane], opened.way2[lane]);
+      }
+      watch_.enter(group.row[lane], group.slot1[lane], group.slot2[lane]);
+    }
+    sum += {opened.missing.largest(), opened.loss.sum()};
   }
 
-  [[gnu::flatten]] void open(const Row& row, const ContactColoring::Row& place, bool keepAngularMomentum,
-                             Opened& sum) {
-    Shift& b1 = shifts_[place.slot1];
-    Shift& b2 = shifts_[place.slot2];
-    const Vector3<S> d = b2.d - b1.d;
-    Vector3<S> n = row.n;
-    S missing(0);
-    S distance(0);
-    if (row.distance < S(0)) {
-      missing = row.reach - n.dot(d);
-    } else {
-      const Vector3<S> r = row.distance * n + d;
-      if (r.squaredNorm() > row.reach * row.reach) {
-        return;  // far enough, unless squares underflow
-      }
-      distance = detail::safeNorm(r);
-      missing = row.reach - distance;
-      if (distance > Eigen::NumTraits<S>::epsilon() * row.reach) {
-        n = detail::safeUnit(r, distance);
-      }
-    }
-    if (!(missing > S(0))) {
-      return;
-    }
-    Opened opened{missing, S(0)};
-    if (keepAngularMomentum && row.share1 > S(0) && row.share2 > S(0)) {
-      const Vector3<S> v_rel = (b2.v - b1.v) + (b2.dv - b1.dv);
-      const Vector3<S> v_t = v_rel - n.dot(v_rel) * n;
-      const S lost = missing / (distance + missing);  // v_t becomes (1 - lost) v_t
-      b1.dv += (row.share1 * lost) * v_t;
-      b2.dv -= (row.share2 * lost) * v_t;
-      opened.loss = row.share1 * b1.mass * v_t.squaredNorm() * lost * (S(2) - lost) / S(2);
-    }
-    if (row.share1 > S(0)) {  // immovable bodies are shared between threads: never written
-      b1.d -= (row.share1 * missing) * n;
-      watch_.move(place.slot1, row.share1 * missing);
-    }
-    if (row.share2 > S(0)) {
-      b2.d += (row.share2 * missing) * n;
-      watch_.move(place.slot2, row.share2 * missing);
-    }
-    sum += opened;
-  }
-
-  std::vector<Shift> shifts_;
+  std::vector<Body> shifts_;  ///< by slot; the last one is the boundary
   detail::RowWatch<S> watch_;
   std::vector<std::uint8_t> deep_;  ///< by contact: more than hardly any overlap
   std::vector<std::size_t> ends_;   ///< by part of the slots, in the list of those moved

@@ -74,7 +74,6 @@ class ProblemBodies {
     const std::size_t n = colouring.bodies().size();
     resizeSparingly(bodies, n + 1);
     resizeSparingly(initial, n + 1);
-    resizeSparingly(accelerations_, n + 1);
     watch.setHolds(watch.holds() && again && speedExponent_ == 0);
     // Mostly nothing was to be scaled, and so it goes on: one look at a body is enough.
     const bool plain = speedExponent_ == 0 && massExponent_ == 0;
@@ -123,7 +122,7 @@ class ProblemBodies {
     again = again && (sameScales_ || !plain);
     mostGuess_ =
         tooMuch * scaled<S>(scales.fastest, speedExponent_) * scaled<S>(scales.heaviest, massExponent_);
-    accelerations_[n] = initial[n].v = initial[n].s = Vector3<S>::Zero();
+    initial[n].v = initial[n].s = Vector3<S>::Zero();
     initial[n].fall = initial[n].radius = S(0);
     bodies[n] = Body{Vector3<S>::Zero(), S(0), Vector3<S>::Zero(), S(0)};
     if (plain && sameScales_ && again == wasAgain) {
@@ -165,6 +164,14 @@ class ProblemBodies {
     }
   }
 
+  /// [m s^-2], zero of what nothing moves.
+  template <class B>
+  static Vector3<S> accelerationOf(const B& source, const ContactColoring& colouring, std::size_t slot) {
+    return colouring.movable(static_cast<std::uint32_t>(slot))
+               ? Vector3<S>(source.accelerations()[colouring.bodies()[slot]])
+               : Vector3<S>(Vector3<S>::Zero());
+  }
+
   /// A body with its mass in place of its inverse, until the scale of masses is known.
   template <class B>
   Body take(const B& source, const ContactColoring& colouring, std::size_t slot) {
@@ -176,16 +183,13 @@ class ProblemBodies {
     b.v = source.velocities()[i];
     b.s =
         friction ? Vector3<S>(r * Vector3<S>(source.angularVelocities()[i])) : Vector3<S>(Vector3<S>::Zero());
-    const Vector3<S> a = movable ? Vector3<S>(source.accelerations()[i]) : Vector3<S>(Vector3<S>::Zero());
-    accelerations_[slot] = a;
-    initial[slot].fall = safeNorm(a);
+    initial[slot].fall = safeNorm(accelerationOf(source, colouring, slot));
     initial[slot].radius = r;
     b.inverseMass = movable ? S(source.masses()[i]) : S(0);
     b.spin = movable && r > S(0) && k > S(0) ? S(1) / k : S(0);
     return b;
   }
 
-  std::vector<Vector3<S>> accelerations_;  ///< [m s^-2] by slot, zero of what nothing moves
   int speedExponent_ = 0;
   int massExponent_ = 0;
   bool sameScales_ = false;  ///< as in the last problem

@@ -52,6 +52,23 @@ struct RowGroup {
   bool holds(std::size_t lane) const { return lane < count; }
 };
 
+/// Calls f(group) for those rows k of [begin, end) of which `wanted(k)`; they share no movable body.
+template <Real S, class Wanted, class F>
+void forGroupsOf(const ContactColoring& colouring, std::size_t begin, std::size_t end, Wanted&& wanted,
+                 F&& f) {
+  RowGroup<S> group;
+  for (std::size_t k = begin; k < end; ++k) {
+    if (wanted(k)) {
+      group.add(colouring.rows(), k);
+    }
+    if (group.count == group.width || (k + 1 == end && group.count > 0)) {
+      group.fill(colouring.staticSlot());
+      f(group);
+      group.count = 0;
+    }
+  }
+}
+
 /// The scalars of an object that is made of them, from the quad of that number on.
 template <Real S, class T>
 [[gnu::always_inline]] inline auto quadOf(T& object, std::size_t number) {

@@ -243,7 +243,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
               const ContactColoring::Row& ends = colouring.rows()[k];
               return problem.watch.isStale(k, ends.slot1, ends.slot2);
             };
-            problem.forGroupsOf(colouring, begin, end, stale, [&](const Group& group) {
+            detail::forGroupsOf<S>(colouring, begin, end, stale, [&](const Group& group) {
               relax<true>(problem, group, S(0), sum);
               sum.looked += group.count;
             });

@@ -282,8 +282,8 @@ class ContactStage {
   /// contacts() by name.
   std::span<const ContactName> names();
 
-  /// Who was in contact at the step's start, or came to rest in it.
-  std::span<const ContactName> resting();
+  /// Who came to rest in the step, sorted.
+  std::span<const ContactKeys> settled();
 
   std::vector<HalfSpace<Scalar>> walls_;
   NeighbourList<Scalar> neighbours_;
@@ -291,6 +291,7 @@ class ContactStage {
   NarrowPhase<Scalar> narrow_;
   ImpactEvents<Scalar> impacts_;
   std::vector<ContactName> names_;
+  std::vector<ContactKeys> settled_;
   mutable std::vector<ContactKeys> struck_;
   Scalar margin_ = Scalar(0);  // of the neighbours: what rests may have a gap
   bool searched_ = false;      // neighbours_ hold for the whole drift

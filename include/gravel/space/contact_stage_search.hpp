@@ -42,11 +42,12 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
   prepareSurfaces(config);
   NarrowPhaseSettings<Scalar> settings{time, config.epsilon, Scalar(0), h};
   if (goesOn) {
-    settings.resting = resting();
+    settings.resting = names();
+    settings.settled = settled();
   }
   settings.before = solver_.names();
   contactsChanged();
-  if (goesOn && searched && settings.resting->empty() && report_.postponed == 0) {
+  if (goesOn && searched && settings.resting->empty() && settings.settled.empty() && report_.postponed == 0) {
     contacts_.clear();
     profiler.skip(Phase::NarrowPhase, "all that met on the way parted again");
     return;
@@ -204,28 +205,15 @@ std::span<const ContactName> ContactStage<Scalar, Layout>::names() {
 }
 
 template <Real Scalar, class Layout>
-std::span<const ContactName> ContactStage<Scalar, Layout>::resting() {
-  const std::span<const ContactName> held = names();
-  const auto rests = [](const Impact<Scalar>& impact) { return impact.rests; };
-  const std::vector<Impact<Scalar>>& all = impacts_.impacts();
-  if (std::none_of(all.begin(), all.end(), rests)) {
-    return held;
-  }
-  if (held.data() != names_.data()) {
-    names_.assign(held.begin(), held.end());
-  }
-  const auto old = static_cast<std::ptrdiff_t>(names_.size());
-  for (const Impact<Scalar>& impact : all) {
+std::span<const ContactKeys> ContactStage<Scalar, Layout>::settled() {
+  settled_.clear();
+  for (const Impact<Scalar>& impact : impacts_.impacts()) {
     if (impact.rests) {
-      names_.push_back({{impact.key1, impact.key2}, impact.first, impact.second});
+      settled_.push_back({impact.key1, impact.key2});
     }
   }
-  const auto before = [](const ContactName& a, const ContactName& b) { return a.keys < b.keys; };
-  std::sort(names_.begin() + old, names_.end(), before);
-  std::inplace_merge(names_.begin(), names_.begin() + old, names_.end(), before);
-  const auto same = [](const ContactName& a, const ContactName& b) { return a.keys == b.keys; };
-  names_.erase(std::unique(names_.begin(), names_.end(), same), names_.end());
-  return names_;
+  std::sort(settled_.begin(), settled_.end());
+  return settled_;
 }
 
 }  // namespace gravel

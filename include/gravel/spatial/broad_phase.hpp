@@ -53,12 +53,24 @@ class BroadPhase {
   void findPairs(const Positions& positions, const Radii& radii, const Ids& ids, const S& margin,
                  const Domain<S>& domain, const S& time, std::vector<Pair>& out) {
     detail::require("margin of a pair search", margin, detail::nonNegative<S>());
-    std::vector<detail::Sphere<S>> spheres;  // not kept: 64 bytes a body, for a search in many steps
+    // Nothing is kept: some 200 bytes a body, for a search in many steps.
+    std::vector<detail::Sphere<S>> spheres;
     detail::gatherSpheres(positions, radii, ids, domain, time, spheres);
     if (std::none_of(spheres.begin(), spheres.end(), [](const auto& s) { return s.radius > S(0); })) {
       out.clear();  // points alone: nothing to search
       return;
     }
+    search(spheres, margin, domain, time, out);
+    std::visit([](auto& method) { method = {}; }, method_);
+  }
+
+ private:
+  // As measured by benchmarks/broad_phase_methods.cpp.
+  static constexpr std::size_t fewBodies = 24;
+  static constexpr double crowded = 8.0;
+
+  void search(const std::vector<detail::Sphere<S>>& spheres, const S& margin, const Domain<S>& domain,
+              const S& time, std::vector<Pair>& out) {
     if constexpr (std::is_floating_point_v<S>) {
       if (kind_ == BroadPhaseKind::Automatic && spheres.size() > fewBodies) {
         const UniformGrid<S>& grid = use<GridPairs<S>>().build(spheres, margin);
@@ -79,11 +91,6 @@ class BroadPhase {
     }
     std::visit([&](auto& method) { method.findPairs(spheres, margin, domain, time, out); }, method_);
   }
-
- private:
-  // As measured by benchmarks/broad_phase_methods.cpp.
-  static constexpr std::size_t fewBodies = 24;
-  static constexpr double crowded = 8.0;
 
   template <class Method>
   Method& use() {

@@ -235,7 +235,7 @@ class NeighbourList {
     skin_ = fixedSkin_ ? *fixedSkin_ : chooseSkin(mean, motionSeen);
     swift_.clear();
     if constexpr (!std::is_same_v<Travel, AtRest>) {
-      skin_ = std::max<S>(skin_, detail::takeSwift(n, mostSwift(n), skin_, travel, ways_, order_, swift_));
+      skin_ = std::max<S>(skin_, detail::takeSwift(n, mostSwift(n), skin_, travel, swift_));
     }
     free_ = skin_;
     flow_ = S(0);
@@ -286,9 +286,7 @@ class NeighbourList {
   std::vector<std::vector<Pair>> swiftPairs_;  ///< of each of them
   std::vector<Pair> extra_;                    ///< all of these, and more that were added
   std::vector<Pair> joined_;                   ///< pairs_ and extra_
-  std::vector<S> ways_;
-  std::vector<std::uint32_t> order_;
-  std::size_t comparisons_ = 0;  ///< of one body with all others since the last search
+  std::size_t comparisons_ = 0;                ///< of one body with all others since the last search
   Domain<S> domain_;
   S time_ = S(0);
   S largest_ = S(0);

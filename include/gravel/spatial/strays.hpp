@@ -118,13 +118,13 @@ void compare(std::uint32_t i, const Positions& positions, const Radii& radii, co
 }
 
 /// Appends to `swift` the bodies that may outrun any skin, at most `most` of the n, fastest first, and leaves
-/// `swift` sorted; none that the skin [m] holds. `ways` and `order` are storage to work in. O(N).
+/// `swift` sorted; none that the skin [m] holds. O(N).
 /// \return [m] twice the way of the next one
 template <Real S, class Travel>
-S takeSwift(std::size_t n, std::size_t most, const S& skin, const Travel& travel, std::vector<S>& ways,
-            std::vector<std::uint32_t>& order, std::vector<std::uint32_t>& swift) {
+S takeSwift(std::size_t n, std::size_t most, const S& skin, const Travel& travel,
+            std::vector<std::uint32_t>& swift) {
   using std::sqrt;
-  ways.resize(n);
+  std::vector<S> ways(n);
   for (std::size_t i = 0; i < n; ++i) {
     ways[i] = wayOf<S>(travel, i).squaredNorm();
     if (!isFinite(ways[i])) {
@@ -134,7 +134,7 @@ S takeSwift(std::size_t n, std::size_t most, const S& skin, const Travel& travel
   if (n == 0) {
     return S(0);
   }
-  order.resize(n);
+  std::vector<std::uint32_t> order(n);
   std::iota(order.begin(), order.end(), 0U);
   most = std::min(most, n - 1);
   const auto faster = [&](std::uint32_t a, std::uint32_t b) {
