@@ -143,6 +143,8 @@ TEMPLATE_LIST_TEST_CASE("proxy: load gives back what store wrote", "[proxy]", Al
   writeCoded(c.bodies.storage(), 1, 3);
   Body<S> in = sampleBody<S>(9);
   in.inertia = S(0.25) * in.mass * in.radius * in.radius;  // powers of two: k is exact
+  const Vector3<S> force = c.bodies[1].force();
+  const Vector3<S> acceleration = c.bodies[1].acceleration();
   c.bodies[1].store(in);
   const Body<S> out = std::as_const(c.bodies)[1].load();
   CHECK(out.position == in.position);
@@ -156,6 +158,10 @@ TEMPLATE_LIST_TEST_CASE("proxy: load gives back what store wrote", "[proxy]", Al
   CHECK(*out.inertia == *in.inertia);
   CHECK(out.material == in.material);
   CHECK(c.bodies[1].id() == BodyId{1});
+  CHECK(force.squaredNorm() > S(0));
+  CHECK(c.bodies[1].force() == force);
+  CHECK(c.bodies[1].acceleration() == acceleration);
+  c.bodies[1].clearForces();
   CHECK(c.bodies[1].force().squaredNorm() == S(0));
   CHECK(c.bodies[1].torque().squaredNorm() == S(0));
   CHECK(c.bodies[1].acceleration().squaredNorm() == S(0));

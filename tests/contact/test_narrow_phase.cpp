@@ -1,6 +1,7 @@
 #include "scenes.hpp"
 #include "support/catch.hpp"
 #include <gravel/contact/narrow_phase.hpp>
+#include <gravel/spatial/broad_phase.hpp>
 
 #include <omp.h>
 
@@ -258,5 +259,28 @@ TEST_CASE("names are found from any place in their list as from its begin") {
         REQUIRE(placeOf(names, {first, second}, from) == found);
       }
     }
+  }
+}
+
+// A giant a thousand times as large as the grains that lie apart on it. Seen to fail: the giant's gap at
+// rest, two radii of a grain, asked of all pairs.
+TEST_CASE("The gap that a giant may have at rest makes no candidates of grains") {
+  Bodies<double, SoA> bodies;
+  Body<double> body;
+  body.radius = 1e3;
+  bodies.add(body);
+  body.radius = 1;
+  for (int k = 0; k < 50; ++k) {
+    const double angle = 3.5e-3 * k;  // 3.5 radii from one to the next
+    body.position = 1001.5 * Vector3<double>(std::cos(angle), std::sin(angle), 0);
+    bodies.add(body);
+  }
+  std::vector<Pair> pairs;
+  BroadPhase<double> search;
+  search.findPairs(bodies.positions(), detail::RestingReaches<Bodies<double, SoA>>{bodies}, bodies.ids(), 0.0,
+                   Domain<double>::open(), 0.0, pairs);
+  CHECK(pairs.size() == 50);
+  for (const Pair& pair : pairs) {
+    CHECK(pair.first == 0);
   }
 }

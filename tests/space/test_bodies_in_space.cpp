@@ -235,6 +235,39 @@ TEST_CASE("Bodies that come and go take their energy with them, and the ledger s
   CHECK_THAT(space.energyLedger().total(), WithinAbs(before, 1e-13));
 }
 
+// Seen to fail: accelerations cleared by store(), which were then missing in the first half of the next step
+// (half of the fall, a pile that sank, an orbit that opened).
+TEST_CASE("A body that is written back as it was goes on with the same bits: fall, orbit and rest") {
+  const auto run = [](double G, bool again) {
+    SimulationConfig<double> config = quiet();
+    config.G = G;
+    Space<double> space(config);
+    space.setUniformField({0, 0, G > 0 ? 0 : -9.81});
+    space.addPlane({0, 0, 1}, -10);
+    for (const double z : {1.0, 2.0, 40.0}) {
+      space.addBody(at({0, 0, z - 10.5}));
+    }
+    space.body(2).velocity() = Vec(0.1, 0, 0);
+    for (std::size_t i = 0; i < 200; ++i) {
+      space.computeDynamics(i);
+      for (std::size_t k = 0; again && k < 3; ++k) {
+        auto body = space.body(k);
+        body.store(body.load());
+      }
+    }
+    std::vector<Vec> state;
+    for (std::size_t k = 0; k < 3; ++k) {
+      state.push_back(space.body(k).position());
+      state.push_back(space.body(k).velocity());
+    }
+    state.push_back(Vec(space.energyLedger().total(), 0, 0));
+    return state;
+  };
+  for (const double G : {0.0, 1.0}) {
+    CHECK(run(G, true) == run(G, false));
+  }
+}
+
 TEST_CASE("A storage with bodies in it is adopted as it is") {
   StorageOf<double, AoS> storage;
   storage.resize(2);

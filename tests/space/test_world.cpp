@@ -154,6 +154,23 @@ TEST_CASE("A hook's forces and torques can be seen, and an empty hook takes them
   CHECK(std::get<3>(space.getDataForDisplay())[0] == Vec::Zero());
 }
 
+TEST_CASE("A force of the hook that is not finite is refused with its body") {
+  for (const bool torque : {false, true}) {
+    Space<double> space(quiet(1e-2));
+    space.addBody(at({0, 0, 0}, {0, 0, 0}));
+    space.addBody(at({5, 0, 0}, {0, 0, 0}));
+    space.setForceHook([torque](auto& bodies, double time) {
+      if (time > 0.015) {
+        (torque ? bodies[1].torque() : bodies[1].force())[2] += std::numeric_limits<double>::quiet_NaN();
+      }
+    });
+    space.computeDynamics(0);
+    CHECK_THROWS_WITH(space.computeDynamics(1), ContainsSubstring(torque ? "torque of the hook on body 1"
+                                                                         : "force of the hook on body 1"));
+    CHECK(isFinite(Vec(space.body(1).position())));
+  }
+}
+
 TEST_CASE("An exception of the hook comes out of the step") {
   Space<double> space(quiet(1e-3));
   space.addBody(at({0, 0, 0}, {1, 0, 0}));

@@ -102,6 +102,7 @@ class Bodies {
     try {
       storage_.at(fields::Id{}, i) = key;
       (*this)[i].store(body);
+      (*this)[i].clearForces();
       places_.put(key, i);
     } catch (...) {
       storage_.resize(i);

@@ -109,7 +109,8 @@ class BasicBodyProxy {
     return body;
   }
 
-  /// Writes a value over the body; its id stays, forces and accelerations are cleared.
+  /// Writes a value over the body; its id stays, and forces and accelerations are those found last. (Cleared,
+  /// they would be missing in the next half step of a body that stays where it is.)
   /// \throws std::invalid_argument on a field out of range, with nothing written
   void store(const Body<Scalar>& body) const requires(!IsConst) {
     validate(body, "body " + std::to_string(toInteger(id())));
@@ -118,15 +119,18 @@ class BasicBodyProxy {
     velocity() = body.fixed ? zero : body.velocity;
     angularVelocity() = body.fixed ? zero : body.angularVelocity;
     orientation() = body.orientation.normalized();
-    force() = zero;
-    torque() = zero;
-    acceleration() = zero;
-    angularAcceleration() = zero;
     mass() = body.mass;
     radius() = body.radius;
     at(fields::InertiaFactor{}) = detail::inertiaFactor(body);
     at(fields::Flags{}) = body.fixed ? static_cast<std::uint32_t>(BodyFlag::Fixed) : 0U;
     setMaterial(body.material);
+  }
+
+  void clearForces() const requires(!IsConst) {
+    force() = Vector3<Scalar>::Zero().eval();
+    torque() = Vector3<Scalar>::Zero().eval();
+    acceleration() = Vector3<Scalar>::Zero().eval();
+    angularAcceleration() = Vector3<Scalar>::Zero().eval();
   }
 
  private:

@@ -22,10 +22,14 @@ struct ImpactSettings {
   Scalar h = Scalar(0);                     ///< [s] >= 0
   Scalar restitutionThreshold = Scalar(0);  ///< [m s^-1] a slower approach stops
   Scalar epsilon = Scalar(0);               ///< [m] centres closer than this count as one point
-  /// What approaches a body after so many impacts of it in the step is left to the solver of simultaneous
-  /// contacts, which ends every cascade. An impact counts 1 - e + 1/32, since only those that lose energy can
-  /// go on for ever; further bounces from the same partner, of which the number is bounded otherwise, 1/32.
+  /// What strikes a body after so many impacts of it in the step stays in contact with it, so that no cascade
+  /// goes on for ever. An impact counts 1 - e + 1/512, since only those that lose energy can go on for ever;
+  /// further bounces from the same partner, of which the number is bounded otherwise, 1/512.
   Scalar mostPerBody = Scalar(8);
+  /// After so many of these, too, the body flies on until the end of the step, through what is in its way, and
+  /// is left to the solver of simultaneous contacts: a heavy one that presses a light one against a wall
+  /// would else go on for as many blows as the ratio of their masses.
+  std::uint32_t mostAfter = 64;
 };
 
 /// One blow.
@@ -150,6 +154,7 @@ struct ImpactHistory {
                                                                     ///< this is the first body
   std::uint64_t partner = 0;                                        ///< of the last one
   S spent = S(0);
+  std::uint32_t after = 0;  ///< impacts since `mostPerBody` was spent
 };
 
 }  // namespace detail

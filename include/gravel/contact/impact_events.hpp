@@ -197,7 +197,8 @@ class ImpactEvents : private detail::ImpactForecast<S> {
       fall += boundary ? S(0) : detail::safeNorm(scene.freeAcceleration(event.second));
       threshold = std::max<S>(threshold, fall * h);
     }
-    const S e = speed > threshold ? restitutionAt(material, speed) : S(0);
+    const bool bounces = !isDone(scene, event.first) && (boundary || !isDone(scene, event.second));
+    const S e = bounces && speed > threshold ? restitutionAt(material, speed) : S(0);
     if constexpr (!std::is_same_v<Decide, NoDecision>) {
       if (!boundary && speed > threshold) {
         Impact<S> impact{event.first, event.second, event.key1, event.key2, t, speed,

@@ -164,7 +164,7 @@ class ImpactForecast {
 
   template <class Scene>
   void predictAgain(const Scene& scene, std::span<const Pair> pairs, std::uint32_t body, const S& from) {
-    if (isDone(scene, body)) {
+    if (isLeft(scene, body)) {
       return;
     }
     for (std::uint32_t k = start_[body]; k < start_[body + 1]; ++k) {
@@ -196,7 +196,7 @@ class ImpactForecast {
   template <class Scene>
   void predict(const Scene& scene, const Pair& pair, const S& from) {
     const auto& [i, j] = pair;
-    if (isDone(scene, i) || isDone(scene, j) || !detail::canTouch(scene.bodies, i, j)) {
+    if (isLeft(scene, i) || isLeft(scene, j) || !detail::canTouch(scene.bodies, i, j)) {
       return;
     }
     Vector3<S> drift;
@@ -249,9 +249,15 @@ class ImpactForecast {
     return isListed(scene.held, {key1, key2});
   }
 
+  /// It does not bounce any more.
   template <class Scene>
   bool isDone(const Scene& scene, std::uint32_t body) const {
     return history_[body].spent >= scene.settings.mostPerBody;
+  }
+  /// It is left to the solver of simultaneous contacts.
+  template <class Scene>
+  bool isLeft(const Scene& scene, std::uint32_t body) const {
+    return history_[body].after >= scene.settings.mostAfter;
   }
 
   /// Enters the last impact.
@@ -261,7 +267,8 @@ class ImpactForecast {
     const auto enter = [&](std::uint32_t body, std::uint64_t partner) {
       History& past = history_[body];
       const bool before = isDone(scene, body);
-      const S least = S(1) / S(32);
+      const S least = S(1) / S(512);
+      past.after += before ? 1 : 0;
       past.spent += past.impacts > 0 && past.partner == partner ? least : S(S(1) - e + least);
       past.partner = partner;
       if (past.impacts++ == 0) {

@@ -16,6 +16,19 @@ S restingMargin() {
   return S(1) / S(1000);
 }
 
+/// Radii with the gap that what rests may have, for searches: in proportion of each, so that a giant's gap is
+/// none of the grains' beside it.
+template <class Bodies>
+struct RestingReaches {
+  const Bodies& bodies;
+
+  std::size_t size() const { return bodies.size(); }
+  auto operator[](std::size_t i) const {
+    using S = std::remove_cvref_t<decltype(bodies.radii()[i])>;
+    return S(bodies.radii()[i] * (S(1) + restingMargin<S>()));
+  }
+};
+
 /// A gap that opens and closes by rounding and by the curvature of paths, and how fast it may be closed.
 ///
 /// What rests keeps its force while its gap is below a 64th of what may rest at all

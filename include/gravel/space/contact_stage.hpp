@@ -293,8 +293,7 @@ class ContactStage {
   std::vector<ContactName> names_;
   std::vector<ContactKeys> settled_;
   mutable std::vector<ContactKeys> struck_;
-  Scalar margin_ = Scalar(0);  // of the neighbours: what rests may have a gap
-  bool searched_ = false;      // neighbours_ hold for the whole drift
+  bool searched_ = false;  // neighbours_ hold for the whole drift
   ContactList<Scalar> contacts_;
   ContactSolver<Scalar> solver_;
   StepRecord<Scalar> record_;

@@ -68,7 +68,7 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
     const std::vector<Pair>& pairs() const { return list.pairs(); }
     std::uint64_t version() const { return list.version(); }
     void follow(const Bodies& all, std::uint32_t i, const Scalar&, std::vector<Pair>& out) {
-      list.follow(i, all.positions(), all.radii(), all.ids(), travel(i), travel, out);
+      list.follow(i, all.positions(), detail::RestingReaches<Bodies>{all}, all.ids(), travel(i), travel, out);
     }
   } near{neighbours_, way};
   const ImpactSettings<Scalar> settings{time, h, std::max(config.restitutionThreshold, config.epsilon),

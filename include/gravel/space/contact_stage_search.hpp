@@ -148,14 +148,13 @@ void ContactStage<Scalar, Layout>::renewGeometry(const Bodies& bodies, const Con
     Vector3<Scalar> r_12 = Vector3<Scalar>(bodies.positions()[c.second]) - x1;
     r_12 = domain.minimumImage(r_12, time);
     const Scalar r2 = bodies.radii()[c.second];
-    // A margin, since a pair that was moved apart is a contact of this step all the same.
-    const auto touch = sphereSphere<Scalar>(r_12, r1, r2, c.key1, c.key2, config.epsilon, r1 + r2);
-    if (touch) {
-      c.normal = touch->normal;
-      c.gap = c.gap > Scalar(0) ? touch->gap : std::min<Scalar>(touch->gap, Scalar(0));
-      c.arm1 = touch->arm1;
-      c.arm2 = touch->arm2;
-    }
+    // However far a pair was moved apart, it is a contact of this step all the same.
+    const Touch<Scalar> touch = touchAt<Scalar>(r_12, detail::safeNorm(r_12), r1, Scalar(r1 + r2), c.key1,
+                                                c.key2, config.epsilon);
+    c.normal = touch.normal;
+    c.gap = c.gap > Scalar(0) ? touch.gap : std::min<Scalar>(touch.gap, Scalar(0));
+    c.arm1 = touch.arm1;
+    c.arm2 = touch.arm2;
   });
 }
 
@@ -165,13 +164,8 @@ void ContactStage<Scalar, Layout>::search(const Bodies& bodies, const Config& co
                                           const Travel& travel, Profiler& profiler) {
   const Profiler::Scope scope(profiler, Phase::NeighbourSearch);
   neighbours_.setKind(config.broadPhase);
-  Scalar largest(0);
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
-    largest = std::max<Scalar>(largest, bodies.radii()[i]);
-  }
-  margin_ = Scalar(2) * largest * detail::restingMargin<Scalar>();
-  neighbours_.update(bodies.positions(), bodies.radii(), bodies.ids(), bodies.revision(), domain, time,
-                     margin_, travel);
+  neighbours_.update(bodies.positions(), detail::RestingReaches<Bodies>{bodies}, bodies.ids(),
+                     bodies.revision(), domain, time, Scalar(0), travel);
 }
 
 template <Real Scalar, class Layout>
@@ -190,8 +184,8 @@ std::optional<std::span<const std::uint32_t>> ContactStage<Scalar, Layout>::near
   if (!domain.isOpen() || neighbours_.strays()) {
     return std::nullopt;
   }
-  return nearWalls_.update(bodies.positions(), bodies.radii(), walls_, neighbours_.rebuilt(),
-                           neighbours_.skin(), margin_, h);
+  return nearWalls_.update(bodies.positions(), detail::RestingReaches<Bodies>{bodies}, walls_,
+                           neighbours_.rebuilt(), neighbours_.skin(), Scalar(0), h);
 }
 
 template <Real Scalar, class Layout>

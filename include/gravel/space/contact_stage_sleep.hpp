@@ -50,8 +50,8 @@ void ContactStage<Scalar, Layout>::forEachApproach(const Bodies& bodies, const C
     const Scalar share =
         w_sq > Scalar(0) ? std::clamp<Scalar>(r.dot(w) / w_sq, Scalar(0), Scalar(1)) : Scalar(0);
     const bool fast = w_sq >= config.sleepSpeed * config.sleepSpeed * h * h;
-    const Scalar reach =
-        Scalar(bodies.radii()[one]) + Scalar(bodies.radii()[held]) + (fast ? margin_ : Scalar(0));
+    const Scalar radii = Scalar(bodies.radii()[one]) + Scalar(bodies.radii()[held]);
+    const Scalar reach = fast ? Scalar(radii * (Scalar(1) + detail::restingMargin<Scalar>())) : radii;
     if (Vector3<Scalar>(r - share * w).squaredNorm() < reach * reach) {
       visit(held);
     }

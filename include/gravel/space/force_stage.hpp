@@ -13,7 +13,8 @@ namespace gravel {
 
 /// The user's own force: adds to `bodies.forces()` [N] and `bodies.torques()` [N m] at time t [s]. It is
 /// called from one thread once per force evaluation; mind that it may read positions and velocities and must
-/// change nothing else. Massless tracers have no force to add to.
+/// change nothing else. Massless tracers have no force to add to. What it throws, or a force that is not
+/// finite (std::invalid_argument), ends the step half way: bodies have moved then, and the time has not.
 template <Real Scalar, class Layout>
 using ForceHook = Callback<void(Bodies<Scalar, Layout>&, Scalar)>;
 
@@ -145,6 +146,13 @@ class ForceStage {
     for (std::size_t i = 0; i < n; ++i) {
       const auto body = bodies[i];
       hookForces_[i] = Vector3<Scalar>(body.force()) - hookForces_[i];
+      if (!isFinite(hookForces_[i]) || !isFinite(Vector3<Scalar>(body.torque()))) {
+        const bool ofForce = !isFinite(hookForces_[i]);
+        detail::refuse((ofForce ? "force of the hook on body " : "torque of the hook on body ") +
+                           std::to_string(toInteger(body.id())),
+                       detail::formatVector(ofForce ? hookForces_[i] : Vector3<Scalar>(body.torque())),
+                       "finite");
+      }
       if (!body.isFixed()) {
         body.acceleration() += hookForces_[i] * body.inverseMass();
         body.angularAcceleration() = body.torque() * body.inverseInertia();

@@ -7,14 +7,15 @@
 
 namespace gravel::detail {
 
-/// Places and masses of four bodies; the mass of a fixed one is kept as another number.
+/// Of four bodies what forces and contacts depend on; the mass of a fixed one is kept as another number.
 template <Real Scalar>
 struct PlaceTile {
-  Scalar rows[4][tileWidth];  ///< x, y, z, mass
+  static constexpr std::size_t count = 6;
+  Scalar rows[count][tileWidth];  ///< x, y, z, mass, radius, inertia/(m r^2)
 
   template <class Bodies>
   void takeOne(const Bodies& bodies, std::size_t i) {
-    for (std::size_t c = 0; c < 4; ++c) {
+    for (std::size_t c = 0; c < count; ++c) {
       rows[c][i % tileWidth] = value(bodies[i], c);
     }
   }
@@ -22,7 +23,7 @@ struct PlaceTile {
   template <class Bodies>
   bool holdsOne(const Bodies& bodies, std::size_t i) const {
     bool same = true;
-    for (std::size_t c = 0; c < 4; ++c) {
+    for (std::size_t c = 0; c < count; ++c) {
       same = same && rows[c][i % tileWidth] == value(bodies[i], c);
     }
     return same;
@@ -36,6 +37,8 @@ struct PlaceTile {
         Eigen::Map<BodyTile<Scalar>>{rows[c]} = tileOf(bodies.storage(), fields::Position{}, c, i);
       }
       Eigen::Map<BodyTile<Scalar>>{rows[3]} = tileOf(bodies.storage(), fields::Mass{}, 0, i);
+      Eigen::Map<BodyTile<Scalar>>{rows[4]} = tileOf(bodies.storage(), fields::Radius{}, 0, i);
+      Eigen::Map<BodyTile<Scalar>>{rows[5]} = tileOf(bodies.storage(), fields::InertiaFactor{}, 0, i);
     }
   }
 
@@ -44,10 +47,14 @@ struct PlaceTile {
     bool same = true;
     if constexpr (hasColumns<typename Bodies::Storage>) {
       using Tile = BodyTile<Scalar>;
-      Tile change = (Eigen::Map<const Tile>(rows[3]) - tileOf(bodies.storage(), fields::Mass{}, 0, i)).abs();
+      const auto differs = [&](std::size_t row, const auto& tile) -> Tile {
+        return (Eigen::Map<const Tile>(rows[row]) - tile).abs();
+      };
+      Tile change = differs(3, tileOf(bodies.storage(), fields::Mass{}, 0, i));
+      change += differs(4, tileOf(bodies.storage(), fields::Radius{}, 0, i));
+      change += differs(5, tileOf(bodies.storage(), fields::InertiaFactor{}, 0, i));
       for (std::size_t c = 0; c < 3; ++c) {
-        change +=
-            (Eigen::Map<const Tile>(rows[c]) - tileOf(bodies.storage(), fields::Position{}, c, i)).abs();
+        change += differs(c, tileOf(bodies.storage(), fields::Position{}, c, i));
       }
       for (std::size_t lane = 0; lane < std::min(tileWidth, end - i); ++lane) {
         same = same && change[static_cast<Eigen::Index>(lane)] == Scalar(0);
@@ -61,6 +68,9 @@ struct PlaceTile {
   static Scalar value(const Proxy& body, std::size_t c) {
     if (c < 3) {
       return body.position()[static_cast<Eigen::Index>(c)];
+    }
+    if (c > 3) {
+      return c == 4 ? Scalar(body.radius()) : Scalar(body.inertiaFactor());
     }
     const Scalar m = body.mass();
     return body.isFixed() ? Scalar(-m - Scalar(1)) : m;

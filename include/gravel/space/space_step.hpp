@@ -109,8 +109,8 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration, const Sc
   profiler_.repeatSkips(more);
 }
 
-/// Checks all bodies; then forces, contacts and the step of the present places, if a body, its place or its
-/// mass was changed, or it became fixed or free, since they were found.
+/// Checks all bodies; then forces, contacts and the step of the present places, if a body, its place, mass,
+/// radius or inertia was changed, or it became fixed or free, since they were found.
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::prepare() {
   bodies_.validateAll();

@@ -221,18 +221,20 @@ class NeighbourList {
     built_ = false;  // stays so if the search throws
     places_.resize(n);
     radii_.resize(n);
-    S sum(0);
     largest_ = S(0);
-    std::size_t spheres = 0;
+    std::vector<S> spheres;
     for (std::size_t i = 0; i < n; ++i) {
       places_[i] = positions[i];
       radii_[i] = radii[i];
       largest_ = std::max(largest_, radii_[i]);
-      sum += radii_[i];
-      spheres += radii_[i] > S(0) ? 1U : 0U;
+      if (radii_[i] > S(0)) {
+        spheres.push_back(radii_[i]);
+      }
     }
-    const S mean = spheres == 0 ? S(0) : S(sum / S(static_cast<double>(spheres)));
-    skin_ = fixedSkin_ ? *fixedSkin_ : chooseSkin(mean, motionSeen);
+    const auto middle = spheres.begin() + static_cast<std::ptrdiff_t>(spheres.size() / 2);
+    std::nth_element(spheres.begin(), middle, spheres.end());
+    const S median = spheres.empty() ? S(0) : *middle;
+    skin_ = fixedSkin_ ? *fixedSkin_ : chooseSkin(median, motionSeen);
     swift_.clear();
     if constexpr (!std::is_same_v<Travel, AtRest>) {
       skin_ = std::max<S>(skin_, detail::takeSwift(n, mostSwift(n), skin_, travel, swift_));
@@ -256,13 +258,14 @@ class NeighbourList {
   }
 
   /// So thick that the list would have held for `goodLife` updates of the motion last seen, within a fraction
-  /// of the mean radius; no skin at all where it would not even hold for two.
-  S chooseSkin(const S& meanRadius, bool motionSeen) {
+  /// of the median radius (a mean would be that of a giant among grains); no skin at all where it would not
+  /// even hold for two.
+  S chooseSkin(const S& radius, bool motionSeen) {
     constexpr double goodLife = 16.0;
-    const S thickest = S(0.8) * meanRadius;
-    const S thinnest = S(0.02) * meanRadius;
+    const S thickest = S(0.8) * radius;
+    const S thinnest = S(0.02) * radius;
     if (!motionSeen || !(moved_sq_ > S(0))) {
-      return S(0.1) * meanRadius;
+      return S(0.1) * radius;
     }
     using std::sqrt;
     const S perUpdate = S(2) * S(sqrt(moved_sq_)) / S(static_cast<double>(updates_));
