@@ -96,3 +96,20 @@ TEST_CASE("A plane travels by the part of its velocity along its normal") {
   boundaries.advance(0.5);
   CHECK_THAT(boundaries.at(0).offset, WithinRel(1.0 + 0.5 * 11.0, 1e-15));
 }
+
+// Seen to fail: the whole velocity new at once, or the whole of it evenly.
+TEST_CASE(
+    "Across its normal a plane's velocity changes evenly in a step, along it at once; a new plane has it") {
+  Boundaries<double> boundaries;
+  boundaries.add(makePlane<double>({0, 0, 1}, 0.0));
+  boundaries.setVelocity(0, {1, 2, 3});
+  CHECK(boundaries.at(0).velocityAt(0.0) == Vector3<double>(1, 2, 3));
+  boundaries.endStep();
+  boundaries.setVelocity(0, {9, 9, 9});
+  boundaries.setVelocity(0, {5, 2, -1});
+  CHECK(boundaries.at(0).velocityAt(0.0) == Vector3<double>(1, 2, -1));
+  CHECK(boundaries.at(0).velocityAt(0.25) == Vector3<double>(2, 2, -1));
+  CHECK(boundaries.at(0).velocityAt(1.0) == Vector3<double>(5, 2, -1));
+  boundaries.endStep();
+  CHECK(boundaries.at(0).velocityAt(0.0) == Vector3<double>(5, 2, -1));
+}

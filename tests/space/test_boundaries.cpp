@@ -22,6 +22,26 @@ Space<double> onFloor(double dt, double friction = 0.0) {
   return space;
 }
 
+Space<double> onBelt(double dt, double kinetic, std::size_t parts) {
+  SimulationConfig<double> config = plain(dt);
+  config.coeffStaticFriction = 0.4;
+  config.coeffFriction = kinetic;
+  config.contactSubsteps = parts;
+  Space<double> space(config);
+  space.addPlane({0, 0, 1}, 0.0);
+  space.setUniformField({0, 0, -g});
+  space.addBody(ball({0, 0, 0.5}, {0, 0, 0}, 0.5, 2.0));
+  return space;
+}
+
+/// Steps `first` to `last` on a belt with the velocity a t.
+void speedUp(Space<double>& space, double a, int first, int last) {
+  for (int k = first; k <= last; ++k) {
+    space.setPlaneVelocity(0, {a * k * space.getTimeStep(), 0, 0});
+    advance(space, 1);
+  }
+}
+
 }  // namespace
 
 TEST_CASE("A floor that rises evenly lifts what rests on it, and does its work") {
@@ -131,6 +151,89 @@ TEST_CASE("A belt that starts under a resting ball drags it with mu g from the f
   space.setPlaneVelocity(0, {1.4, 0, 0});
   advance(space, 1);
   CHECK_THAT(space.body(0).velocity()[0], WithinRel(mu * g * dt, 1e-12));
+}
+
+// Carried without slip a ball has 2/7 of the belt's acceleration a, by the friction 2/7 m a; so it is carried
+// while a <= 7/2 mu_s g, and slides with mu_k g beyond. Both to the rounding of 100 steps.
+// Seen to fail: the belt's new velocity from the step's begin on, as it was once: then the first solve has
+// half of a part's weight to follow a whole step's change, and what slips with mu_k < mu_s never sticks
+// again.
+TEST_CASE(
+    "A belt that speeds up carries what rests on it up to the static threshold, in any number of parts") {
+  for (const double dt : {1e-2, 1e-3}) {
+    for (const std::size_t parts : {std::size_t{1}, std::size_t{4}}) {
+      for (const double kinetic : {0.0, 0.25, 0.4}) {
+        for (const double ratio : {0.99, 1.01}) {
+          CAPTURE(dt, parts, kinetic, ratio);
+          const double a = ratio * 3.5 * 0.4 * g;
+          const int steps = 100;
+          Space<double> space = onBelt(dt, kinetic, parts);
+          advance(space, 1);
+          const double before = space.energyLedger().total();
+          speedUp(space, a, 1, steps);
+          const double expected = (ratio < 1 ? 2.0 / 7.0 * a : kinetic * g) * dt * steps;
+          const double v = space.body(0).velocity()[0];
+          CHECK_THAT(v, WithinAbs(expected, 1e-13 * a * dt * steps));
+          const double slip = a * dt * steps - (v - 0.5 * space.body(0).angularVelocity()[1]);
+          CHECK_THAT(slip, WithinAbs(a * dt * steps - 3.5 * expected, 1e-12 * a * dt * steps));
+          const EnergyLedger<double> ledger = space.energyLedger();
+          CHECK_THAT(ledger.total(), WithinAbs(before, 1e-12 * (before + std::pow(a * dt * steps, 2))));
+          CHECK(ledger.friction >= 0.0);
+          CHECK(-ledger.work >= v * v);
+        }
+      }
+    }
+  }
+}
+
+// Seen to fail: a velocity that new planes come to within their first step.
+TEST_CASE("A belt runs from the start, and what moves along with it feels nothing") {
+  for (const std::size_t parts : {std::size_t{1}, std::size_t{4}}) {
+    Space<double> space = onBelt(1e-3, 0.25, parts);
+    space.body(0).velocity() = Vec(1e-3, 0, 0);
+    space.setPlaneVelocity(0, {1e-3, 0, 0});
+    advance(space, 100);
+    CHECK(space.body(0).velocity()[0] == 1e-3);
+    CHECK(space.body(0).angularVelocity() == Vec(0, 0, 0));
+    CHECK(space.energyLedger().friction == 0.0);
+  }
+}
+
+// Seen to fail: snapshots that forget the velocity before, or which planes are new; the velocity before taken
+// from the last call.
+TEST_CASE("A belt on its way to a velocity goes on alike after a restart, a copy and second thoughts") {
+  const TemporaryFile file("belt");
+  const double a = 0.95 * 3.5 * 0.4 * g;
+  for (const bool starts : {false, true}) {
+    Space<double> whole = onBelt(1e-2, 0.0, 4);
+    Space<double> doubtful = whole;
+    for (Space<double>* space : {&whole, &doubtful}) {
+      if (!starts) {
+        advance(*space, 1);
+        speedUp(*space, a, 1, 20);
+        if (space == &doubtful) {
+          space->setPlaneVelocity(0, {-3, 1, 0});
+        }
+        space->setPlaneVelocity(0, {a * 21e-2, 0, 0});
+      }
+    }
+    whole.save(file.path());
+    Space<double> again;
+    again.restore(file.path());
+    Space<double> copy = whole;
+    for (Space<double>* space : {&whole, &doubtful, &again, &copy}) {
+      if (starts) {
+        space->setPlaneVelocity(0, {1e-3, 0, 0});
+      }
+      advance(*space, 1);
+      speedUp(*space, a, 22, 30);
+    }
+    CHECK(sameBits(stateOf(whole), stateOf(doubtful)));
+    CHECK(sameBits(stateOf(whole), stateOf(again)));
+    CHECK(sameBits(stateOf(whole), stateOf(copy)));
+    CHECK(whole.energyLedger().work == again.energyLedger().work);
+    CHECK((starts || std::abs(whole.body(0).velocity()[0] - 2.0 / 7.0 * a * 0.3) < 1e-12));
+  }
 }
 
 // A plate that shakes with less than g carries the ball along: position to the gap that a resting contact may

@@ -21,7 +21,15 @@ struct Plane {
   /// [m s^-1] of the plane's matter. Its part along n moves the plane; the part across n drags what rubs on
   /// it along, as a conveyor belt does.
   Vector3<Scalar> velocity = Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(0));
+  Vector3<Scalar> velocityBefore = Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(0));  ///< in the last step
   std::size_t number = 0;  ///< its own among the boundaries of a space, never given twice
+
+  /// [m s^-1] when a share (0 to 1) of the step has passed. Across n it changes evenly: friction has a weight
+  /// of as much of the step to follow it with. Along n the new one holds at once, as the plane moves.
+  Vector3<Scalar> velocityAt(const Scalar& share) const {
+    const Vector3<Scalar> change = velocity - velocityBefore;
+    return velocity - (Scalar(1) - share) * Vector3<Scalar>(change - normal.dot(change) * normal);
+  }
 };
 
 /// \param normal of any length but zero; `offset` is measured along the normal made unit
@@ -84,6 +92,8 @@ class Boundaries {
   bool empty() const { return planes_.empty(); }
   /// The number that the next plane gets.
   std::size_t next() const { return next_; }
+  /// Planes of this number and above have been through no step yet.
+  std::size_t firstNew() const { return firstNew_; }
 
   /// \return the plane's number
   std::size_t add(Plane<Scalar> plane) {
@@ -93,9 +103,10 @@ class Boundaries {
   }
 
   /// Takes over planes with their numbers, in increasing order and below `next`.
-  void assign(std::vector<Plane<Scalar>> planes, std::size_t next) {
+  void assign(std::vector<Plane<Scalar>> planes, std::size_t next, std::size_t firstNew) {
     planes_ = std::move(planes);
     next_ = next;
+    firstNew_ = firstNew;
   }
 
   /// \throws std::out_of_range if there is no plane of that number
@@ -105,6 +116,7 @@ class Boundaries {
     planes_.erase(planes_.begin() + static_cast<std::ptrdiff_t>(indexOf(number)));
   }
 
+  /// What a new plane is given it has from the start; others get there within the next step.
   /// \throws std::invalid_argument for a velocity that is not finite; std::out_of_range as above
   void setVelocity(std::size_t number, const Vector3<Scalar>& velocity) {
     Plane<Scalar>& plane = planes_[indexOf(number)];
@@ -112,6 +124,9 @@ class Boundaries {
       detail::refuse("velocity of plane " + std::to_string(number), detail::formatVector(velocity), "finite");
     }
     plane.velocity = velocity;
+    if (number >= firstNew_) {
+      plane.velocityBefore = velocity;
+    }
   }
 
   /// Moves every plane by its velocity over h [s].
@@ -119,6 +134,14 @@ class Boundaries {
     for (Plane<Scalar>& plane : planes_) {
       plane.offset += plane.normal.dot(plane.velocity) * h;
     }
+  }
+
+  /// A step is over, in which all have come to their velocities.
+  void endStep() {
+    for (Plane<Scalar>& plane : planes_) {
+      plane.velocityBefore = plane.velocity;
+    }
+    firstNew_ = next_;
   }
 
  private:
@@ -133,6 +156,7 @@ class Boundaries {
 
   std::vector<Plane<Scalar>> planes_;
   std::size_t next_ = 0;
+  std::size_t firstNew_ = 0;
 };
 
 }  // namespace gravel

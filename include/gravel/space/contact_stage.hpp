@@ -42,16 +42,11 @@ class ContactStage {
   void detect(const Bodies& bodies, const Config& config, const Scalar& time, const Scalar& h, bool goesOn,
               Profiler& profiler);
 
-  /// The plane moves on at another velocity; what rests on it feels that at once.
-  void setPlaneVelocity(std::size_t plane, const Vector3<Scalar>& velocity) {
-    boundaries.setVelocity(plane, velocity);
-    const auto onPlane = [&](const Contact<Scalar>& c) {
-      return c.second == staticPartner && c.key2 == boundaryKey(plane);
-    };
-    if (contacts_.setDrift(velocity, onPlane)) {
-      contactsChanged();
-    }
-  }
+  // Of planes that move: contact_stage_planes.hpp.
+
+  void setPlaneVelocity(std::size_t plane, const Vector3<Scalar>& velocity);
+  /// The next solve sees planes as they move when a share (0 to 1) of the step has passed.
+  void drivePlanes(const Scalar& share);
 
   /// Before the drift of a step of length h [s] from `time`: deals the impacts inside it, each at its own
   /// time, so that the drift ends where the bodies are after them. Adds to the report of the step.
@@ -264,6 +259,8 @@ class ContactStage {
     resumed_ = {};
   }
 
+  void setDrift(std::size_t plane, const Vector3<Scalar>& drift);
+
   void renewGeometry(const Bodies& bodies, const Config& config, const Scalar& time);
 
   template <class Course>
@@ -312,5 +309,6 @@ class ContactStage {
 }  // namespace gravel
 
 #include <gravel/space/contact_stage_impacts.hpp>
+#include <gravel/space/contact_stage_planes.hpp>
 #include <gravel/space/contact_stage_search.hpp>
 #include <gravel/space/contact_stage_sleep.hpp>

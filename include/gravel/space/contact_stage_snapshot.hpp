@@ -17,12 +17,15 @@ void ContactStage<Scalar, Layout>::save(SnapshotWriter& out) const {
   std::vector<std::uint32_t> surfaces;
   std::vector<std::uint64_t> planeNumbers;
   for (const Plane<Scalar>& plane : boundaries.planes()) {
-    numbers.insert(numbers.end(), {plane.normal[0], plane.normal[1], plane.normal[2], plane.offset,
-                                   plane.velocity[0], plane.velocity[1], plane.velocity[2]});
+    numbers.insert(numbers.end(),
+                   {plane.normal[0], plane.normal[1], plane.normal[2], plane.offset, plane.velocity[0],
+                    plane.velocity[1], plane.velocity[2], plane.velocityBefore[0], plane.velocityBefore[1],
+                    plane.velocityBefore[2]});
     surfaces.push_back(static_cast<std::uint32_t>(plane.material));
     planeNumbers.push_back(plane.number);
   }
   planeNumbers.push_back(boundaries.next());
+  planeNumbers.push_back(boundaries.firstNew());
   out.array("planes", numbers.data(), numbers.size());
   out.array("materials of planes", surfaces.data(), surfaces.size());
   out.array("numbers of planes", planeNumbers.data(), planeNumbers.size());
@@ -90,7 +93,7 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
   const auto pairs = in.array<Material<Scalar>>("materials of contacts");
   const auto keys = in.array<std::uint64_t>("keys of impulses");
   const std::vector<Scalar> impulses = in.array<Scalar>("impulses");
-  if (sides.size() != 7 * surfaces.size() || planeNumbers.size() != surfaces.size() + 1 ||
+  if (sides.size() != 10 * surfaces.size() || planeNumbers.size() != surfaces.size() + 2 ||
       2 * impulses.size() != 7 * keys.size() || surfacesOf.empty() || places.size() * 4 != names.size() * 9 ||
       pairs.size() * 4 != names.size()) {
     in.fail("holds lists of different lengths");
@@ -99,14 +102,16 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
   std::vector<Plane<Scalar>> planes;
   for (std::size_t p = 0; p < surfaces.size(); ++p) {
     materials.check(surfaces[p], "plane " + std::to_string(p));
-    const Scalar* side = &sides[7 * p];
+    const Scalar* side = &sides[10 * p];
     planes.push_back({{side[0], side[1], side[2]},
                       side[3],
                       MaterialId{surfaces[p]},
                       {side[4], side[5], side[6]},
+                      {side[7], side[8], side[9]},
                       static_cast<std::size_t>(planeNumbers[p])});
   }
-  boundaries.assign(std::move(planes), static_cast<std::size_t>(planeNumbers.back()));
+  boundaries.assign(std::move(planes), static_cast<std::size_t>(planeNumbers[surfaces.size()]),
+                    static_cast<std::size_t>(planeNumbers.back()));
   for (std::size_t k = 0; k < names.size() / 4; ++k) {
     const std::uint64_t* name = &names[4 * k];
     const Scalar* c = &places[9 * k];

@@ -101,6 +101,7 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration, const Sc
     previous_dt_ = h;
     profiler_.skip(Phase::Integration, "no bodies");
   }
+  contact_.boundaries.endStep();
   std::tie(time_, timeRest_) = timeAfter(h);
   ++steps_;
   stepGoesOn_ = contacts().empty() && impacts().empty();

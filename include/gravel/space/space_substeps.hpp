@@ -39,10 +39,12 @@ struct Space<Scalar, Layout>::Departure {
   Space* space;
   Scalar start;  ///< [s] since the start of the step
   Scalar h;
-  bool meets;  ///< anything can touch; if not, kick and drift are one pass
+  Scalar middle;  ///< of the part, as a share of the step
+  bool meets;     ///< anything can touch; if not, kick and drift are one pass
   explicit operator bool() const { return meets; }
   void operator()(const Scalar& kick) const {
     if (!space->contacts().empty()) {
+      space->contact_.drivePlanes(middle);
       space->resolveCollisions();
       space->contact_.endFirstHalf(space->force_, space->bodies_, kick);
     }
@@ -102,6 +104,9 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
     return k == 0 ? Scalar(0)
                   : Scalar(h * (Scalar(static_cast<double>(k)) / Scalar(static_cast<double>(parts))));
   };
+  const auto halves = [&](std::size_t k) {  // of parts, as a share of the step
+    return Scalar(static_cast<double>(k)) / Scalar(static_cast<double>(2 * parts));
+  };
   const Scalar start = share(part);
   const Scalar end = last ? h : share(part + 1);
   contact_dt_ = parts == 1 ? h : Scalar(h / Scalar(static_cast<double>(parts)));
@@ -133,7 +138,8 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
   };
   const char* const alone = contact_.reasonToSkip(bodies_);
   const bool quiet = hasSeveralDrifts() && !apart;
-  const Departure departure{this, start, contact_dt_, !quiet && (alone == nullptr || !contacts().empty())};
+  const Departure departure{this, start, contact_dt_, halves(2 * part + 1),
+                            !quiet && (alone == nullptr || !contacts().empty())};
   if (!departure && alone != nullptr) {
     profiler_.skip(Phase::Impacts, alone);
   }
@@ -161,6 +167,7 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
     left_.work -= (hookPower_ + power) * (apart ? contact_dt_ : h) / Scalar(2);
   }
   const std::vector<std::pair<BodyId, BodyId>> merges = decideCollisions(Scalar(time_ + end));
+  contact_.drivePlanes(halves(2 * part + 2));
   resolveCollisions();
   contact_.endPart(start, last);
   mergeCollided(merges, Scalar(time_ + end));
