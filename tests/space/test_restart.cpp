@@ -264,6 +264,33 @@ TEST_CASE("The hook and the log stay those of the space that takes a file up") {
   CHECK(calls > 0);
 }
 
+// Seen to fail: what the hook gave to the forces left out of the file, so that the first step booked its
+// share as that of gravity.
+TEST_CASE("A run with a force of its own goes on with the same bits and the same ledger") {
+  const auto set = [](Space<double>& space) {
+    space.setForceHook([](Bodies<double, SoA>& bodies, double) {
+      for (std::size_t i = 0; i < bodies.size(); ++i) {
+        bodies[i].force() -= 30 * Vec(bodies[i].position());
+        bodies[i].torque() += Vec(0, 0, 0.1);
+      }
+    });
+  };
+  Space<double> space = busy<double>();
+  set(space);
+  advance(space, 150);
+  REQUIRE(space.contactCount() > 0);
+  const TemporaryFile file("force");
+  space.save(file.path());
+  Space<double> other;
+  set(other);
+  other.restore(file.path());
+  advance(space, 50);
+  advance(other, 50);
+  CHECK(sameBits(stateOf(space), stateOf(other)));
+  CHECK(space.energyLedger().total() == other.energyLedger().total());
+  CHECK(space.energyLedger().friction == other.energyLedger().friction);
+}
+
 // Seen to fail: contacts kept as a view of those of the first space, under the address sanitizer.
 TEST_CASE("A copy of a space goes on as the first one does, also when that one is gone") {
   auto first = std::make_unique<Space<double>>(busy<double>());

@@ -149,8 +149,8 @@ void ContactStage<Scalar, Layout>::renewGeometry(const Bodies& bodies, const Con
     r_12 = domain.minimumImage(r_12, time);
     const Scalar r2 = bodies.radii()[c.second];
     // However far a pair was moved apart, it is a contact of this step all the same.
-    const Touch<Scalar> touch = touchAt<Scalar>(r_12, detail::safeNorm(r_12), r1, Scalar(r1 + r2), c.key1,
-                                                c.key2, config.epsilon);
+    const Touch<Scalar> touch =
+        touchAt<Scalar>(r_12, detail::safeNorm(r_12), r1, Scalar(r1 + r2), c.key1, c.key2, config.epsilon);
     c.normal = touch.normal;
     c.gap = c.gap > Scalar(0) ? touch.gap : std::min<Scalar>(touch.gap, Scalar(0));
     c.arm1 = touch.arm1;

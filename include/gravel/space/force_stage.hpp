@@ -104,6 +104,21 @@ class ForceStage {
     return force;
   }
 
+  /// What the hook gave to the present forces, three numbers a body; empty without one. For a restart.
+  std::vector<Scalar> hookParts() const {
+    std::vector<Scalar> parts;
+    for (std::size_t i = 0; hook && i < hookForces_.size(); ++i) {
+      parts.insert(parts.end(), {hookForces_[i][0], hookForces_[i][1], hookForces_[i][2]});
+    }
+    return parts;
+  }
+  void setHookParts(const std::vector<Scalar>& parts) {
+    hookForces_.clear();
+    for (std::size_t i = 0; i + 2 < parts.size(); i += 3) {
+      hookForces_.push_back(Vector3<Scalar>(parts[i], parts[i + 1], parts[i + 2]));
+    }
+  }
+
  private:
   /// The field's part of the acceleration, and the force.
   void finishOne(Bodies<Scalar, Layout>& bodies, std::size_t i, bool pulls) const {

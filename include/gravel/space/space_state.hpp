@@ -219,6 +219,8 @@ void Space<Scalar, Layout>::save(const std::string& path) const {
   saveBodies(bodies_, out);
   const std::vector<Scalar> lost = lost_.lostParts(bodies_);
   out.array("lost parts", lost.data(), lost.size());
+  const std::vector<Scalar> ofHook = force_.hookParts();
+  out.array("forces of the hook", ofHook.data(), ofHook.size());
   orbits_.save(bodies_, out);
   out.write(path);
 }
@@ -241,6 +243,10 @@ void Space<Scalar, Layout>::restore(const std::string& path) {
   gravel::Bodies<Scalar, SoA> bodies = loadBodies<Scalar>(in);
   bodies.skipIds(BodyId{numbers.nextId});
   const std::vector<Scalar> lost = in.array<Scalar>("lost parts");
+  const std::vector<Scalar> ofHook = in.array<Scalar>("forces of the hook");
+  if (!ofHook.empty() && ofHook.size() != 3 * bodies.size()) {
+    in.fail("holds lists of different lengths");
+  }
   OrbitStage<Scalar, Layout> orbits;
   orbits.load(bodies, in);
 
@@ -255,6 +261,7 @@ void Space<Scalar, Layout>::restore(const std::string& path) {
   force_.gravity.setKind(config.gravity);
   force_.gravity.setTolerance(config.gravityTolerance);
   force_.field = numbers.field;
+  force_.setHookParts(ofHook);
   colors_.clear();
   dt_ = numbers.dt;
   previous_dt_ = numbers.previous_dt;
