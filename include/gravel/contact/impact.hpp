@@ -26,8 +26,8 @@ struct ImpactSettings {
   /// goes on for ever. An impact counts 1 - e + 1/512, since only those that lose energy can go on for ever;
   /// further bounces from the same partner, of which the number is bounded otherwise, 1/512.
   Scalar mostPerBody = Scalar(8);
-  /// After so many of these, too, the body flies on until the end of the step, through what is in its way, and
-  /// is left to the solver of simultaneous contacts: a heavy one that presses a light one against a wall
+  /// After so many of these, too, the body flies on until the end of the step, through what is in its way,
+  /// and is left to the solver of simultaneous contacts: a heavy one that presses a light one against a wall
   /// would else go on for as many blows as the ratio of their masses.
   std::uint32_t mostAfter = 64;
 };
