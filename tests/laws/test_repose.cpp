@@ -113,18 +113,28 @@ Heap heapAfterWalls(double friction, double rolling, std::uint64_t seed, const S
 
 }  // namespace
 
-// Six seeds of each: 9.4 with a standard deviation of 2.6, and 30.5 with 2.5 degrees; bounds at four of them.
-// Larger heaps, with friction in between: docs/accuracy-and-speed.md. Seen to fail: steps of 0.2 sqrt(d/g),
-// at which flanks creep away.
+// Ten seeds of the rough heap: 28.7 with a standard deviation of 2.2 degrees, so that a median of five has
+// one of 1.3; bounds at four of them. Six of the smooth one: 9.4 with 2.6. One heap in ten or twenty does not
+// rest by the end, since a last grain still rolls (nothing resists that), so the median is asked. Larger
+// heaps, with friction in between: docs/accuracy-and-speed.md. Seen to fail: steps of 0.2 sqrt(d/g), at which
+// flanks creep.
 TEST_CASE("Grains with friction stand at an angle where smooth ones run off") {
   const Heap smooth = heapAfterWalls(0.0, 0.0, 2);
-  const Heap rough = heapAfterWalls(0.6, 0.0, 2);
-  CAPTURE(smooth.angle, rough.angle, rough.speed);
-  CHECK(rough.speed < 1e-3);  // it rests
+  std::vector<double> angles;
+  std::vector<double> speeds;
+  for (std::uint64_t seed = 2; seed < 7; ++seed) {
+    const Heap rough = heapAfterWalls(0.6, 0.0, seed);
+    angles.push_back(rough.angle);
+    speeds.push_back(rough.speed);
+  }
+  std::sort(angles.begin(), angles.end());
+  std::sort(speeds.begin(), speeds.end());
+  CAPTURE(smooth.angle, angles, speeds);
+  CHECK(speeds[2] < 1e-3);  // they rest
   CHECK(smooth.angle < 20.0);
-  CHECK(rough.angle > 20.5);
-  CHECK(rough.angle < 40.5);
-  CHECK(rough.angle > smooth.angle + 6.0);
+  CHECK(angles[2] > 23.4);
+  CHECK(angles[2] < 34.0);
+  CHECK(angles[2] > smooth.angle + 6.0);
 }
 
 // Four seeds rest at 24.4 to 30.0 degrees. Seen to fail: one part, or parts chosen by speeds alone, where the
