@@ -111,7 +111,6 @@ TEST_CASE("Angular momentum is kept where a crowd is moved far apart in a step")
   const Vec before = space.conserved().angularMomentum;
   const double size = sizesOf(space).angular;
   advance(space, 20);
-  CHECK(space.conserved().centreOfMass.norm() < 1);
   CHECK((space.conserved().angularMomentum - before).norm() <= 1e-13 * size);
 }
 
