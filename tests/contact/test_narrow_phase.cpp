@@ -262,8 +262,7 @@ TEST_CASE("names are found from any place in their list as from its begin") {
   }
 }
 
-// A giant a thousand times as large as the grains that lie apart on it. Seen to fail: the giant's gap at
-// rest, two radii of a grain, asked of all pairs.
+// A giant a thousand times as large as the grains that lie apart on it.
 TEST_CASE("The gap that a giant may have at rest makes no candidates of grains") {
   Bodies<double, SoA> bodies;
   Body<double> body;
