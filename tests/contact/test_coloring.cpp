@@ -6,6 +6,8 @@
 
 #include <omp.h>
 
+#include <algorithm>
+#include <numeric>
 #include <set>
 
 using namespace gravel;
@@ -63,6 +65,50 @@ Graph randomGraph(std::size_t n, double degree, std::uint64_t seed, bool bothWay
     }
   }
   return graph;
+}
+
+/// The parts are all rows, each once; and of all groups of rows that threads share one by one, the same share
+/// has gone by at any time, but for a part of each.
+// Seen to fail: parts in the order of the colours.
+void checkParts(const ContactColoring& coloring) {
+  std::vector<std::pair<std::size_t, std::size_t>> groups{{0, coloring.loneCount()}};
+  for (std::size_t colour = 0; colour <= coloring.colours(); ++colour) {
+    groups.emplace_back(coloring.begin(colour), coloring.end(colour));
+  }
+  std::vector<std::size_t> next;
+  for (const auto& [begin, end] : groups) {
+    next.push_back(begin);
+  }
+  bool inOrder = true;
+  bool alike = true;
+  for (const ContactColoring::Part& part : coloring.parts()) {
+    std::size_t own = 0;
+    while (own < groups.size() && !(groups[own].first <= part.begin && part.begin < groups[own].second)) {
+      ++own;
+    }
+    REQUIRE(own < groups.size());
+    inOrder = inOrder && part.begin == next[own] && part.end <= groups[own].second &&
+              part.end - part.begin <= ContactColoring::partSize;
+    next[own] = part.end;
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      const auto share = [&](std::size_t k, double more) {  // that has gone by, and so many rows more
+        const auto [begin, end] = groups[k];
+        return (static_cast<double>(next[k] - begin) + more) / static_cast<double>(end - begin);
+      };
+      const auto isShared = [&](std::size_t k) {
+        return groups[k].second - groups[k].first >= ContactColoring::fewRows;
+      };
+      if (isShared(own) && isShared(g)) {
+        constexpr double size = ContactColoring::partSize;
+        alike = alike && share(own, -size / 2) <= std::min(1.0, share(g, size));
+      }
+    }
+  }
+  CHECK(inOrder);
+  CHECK(alike);
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    CHECK(next[g] == groups[g].second);
+  }
 }
 
 }  // namespace
@@ -271,6 +317,31 @@ TEST_CASE("colours, and the order within one, are those of one walk along a list
       same = same && other.slot1 == row.slot1 && other.slot2 == row.slot2 && other.contact == row.contact;
     }
     CHECK(same);
+    checkParts(coloring);
+    CHECK(std::is_sorted(coloring.bodies().begin(), coloring.bodies().end()));
   }
   omp_set_num_threads(before);
+}
+
+// Seen to fail: slots numbered as their bodies appear.
+TEST_CASE("slots stand in the order of ids, whatever the indices are") {
+  Bodies<double, SoA> bodies = randomCloud<double>(500, 7.0, 8);
+  std::vector<std::size_t> order(bodies.size());
+  std::iota(order.rbegin(), order.rend(), std::size_t{0});
+  bodies.reorder(order);
+  const auto contacts = contactsOf<double>(bodies, Material<double>{}, {{{0, 0, 1}, -3, {}}});
+  ContactColoring coloring;
+  coloring.build(std::span<const Contact<double>>(contacts), bodies);
+  std::set<std::uint64_t> ids;
+  for (const Contact<double>& c : contacts) {
+    ids.insert(c.key1);
+    if (c.second != staticPartner) {
+      ids.insert(c.key2);
+    }
+  }
+  std::vector<std::uint64_t> bySlot;
+  for (const std::uint32_t body : coloring.bodies()) {
+    bySlot.push_back(bodies.ids()[body]);
+  }
+  CHECK(bySlot == std::vector<std::uint64_t>(ids.begin(), ids.end()));
 }

@@ -5,6 +5,8 @@
 
 #include <omp.h>
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <stdexcept>
@@ -144,6 +146,59 @@ TEST_CASE("parallel: with two threads two chunks run at the same time", "[parall
     met += started == 2 ? 1 : 0;
   });
   CHECK(met == 2);
+}
+
+TEST_CASE("parallel: each of the tasks that are shared alike is done once, for more threads and for fewer",
+          "[parallel]") {
+  for (const int threads : {1, 2, 3, 8, 70}) {
+    const WithThreads scope(threads);
+    for (const std::size_t count : {0U, 1U, 2U, 3U, 7U, 64U, 1001U}) {
+      INFO("threads " << threads << ", tasks " << count);
+      std::vector<std::atomic<int>> seen(count);
+      parallelForTasks<Share::Alike>(count, [&](std::size_t task) { ++seen[task]; });
+      CHECK(std::all_of(seen.begin(), seen.end(), [](const auto& times) { return times == 1; }));
+    }
+  }
+}
+
+// Seen to fail: OpenMP's static schedule, and threads that do not look for what others have left.
+TEST_CASE("parallel: a thread that is held up leaves its tasks to the others", "[parallel]") {
+  const WithThreads scope(2);
+  constexpr std::size_t count = 16;
+  std::atomic<std::size_t> others{0};
+  std::atomic<bool> alone{false};
+  parallelForTasks<Share::Alike>(count, [&](std::size_t task) {
+    if (task > 0) {
+      ++others;
+      return;
+    }
+    for (int ms = 0; ms < 20000 && others < count - 1; ++ms) {
+      waitMilliseconds(1);
+    }
+    alone = others < count - 1;
+  });
+  CHECK_FALSE(alone);
+}
+
+// Seen to fail: threads that begin anywhere but with their own part.
+TEST_CASE("parallel: tasks that are shared alike begin with a part of each thread's own, in their order",
+          "[parallel]") {
+  const WithThreads scope(2);
+  constexpr std::size_t count = 16;
+  std::array<std::atomic<std::size_t>, 2> first{count, count};
+  std::atomic<int> started{0};
+  parallelForTasks<Share::Alike>(count, [&](std::size_t task) {
+    std::atomic<std::size_t>& mine = first[static_cast<std::size_t>(omp_get_thread_num())];
+    if (mine == count) {
+      mine = task;
+      ++started;
+      for (int ms = 0; ms < 20000 && started < 2; ++ms) {
+        waitMilliseconds(1);
+      }
+    }
+  });
+  CHECK(first[0] == 0);
+  CHECK(first[1] == count / 2);
 }
 
 TEST_CASE("parallel: one chunk runs on the calling thread and opens no region", "[parallel]") {

@@ -184,7 +184,7 @@ class Bodies {
   /// Looks at every body: the guard against values written through proxies or by a user's own code.
   /// \throws std::invalid_argument naming body, field, value and what is allowed
   void validateAll() const {
-    parallelForChunks(size(), 4096, [&](std::size_t begin, std::size_t end) {
+    parallelForChunks<Share::Alike>(size(), 1024, [&](std::size_t begin, std::size_t end) {
       detail::forTilesOrBodies(
           storage_, begin, end, [&](std::size_t i) { validateTile(i, end); },
           [&](std::size_t i) { validateOne(i); });

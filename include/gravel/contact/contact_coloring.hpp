@@ -8,6 +8,7 @@
 #include <gravel/core/memory.hpp>
 #include <gravel/core/parallel.hpp>
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <span>
@@ -26,7 +27,7 @@ class ContactColoring {
  public:
   static constexpr std::size_t maxColours = 62;
 
-  /// Slots: the bodies that take part, numbered from 0 as they first appear; the last one, `staticSlot()`,
+  /// Slots: the bodies that take part, numbered from 0 in the order of ids; the last one, `staticSlot()`,
   /// stands for boundaries.
   struct Row {
     std::uint32_t contact;  ///< index in the list
@@ -38,7 +39,7 @@ class ContactColoring {
   template <Real S, ContactBodies B>
   void build(std::span<const Contact<S>> contacts, const B& bodies) {
     takeEnds(contacts, bodies.size());
-    number(bodies);
+    number(contacts, bodies);
     choose();
     arrange();
   }
@@ -52,6 +53,18 @@ class ContactColoring {
   /// Rows [begin, end) of a colour; the colour `colours()` is the overflow.
   std::size_t begin(std::size_t colour) const { return start_[colour]; }
   std::size_t end(std::size_t colour) const { return start_[colour + 1]; }
+
+  /// All rows, for passes over them in which contacts may share bodies: parts of up to `partSize` rows of one
+  /// colour, those first that stand first in their colours. So a thread that takes its share of the parts has
+  /// about the rows, and the bodies, that it has when colours are shared between threads one by one, and they
+  /// stay in its cache.
+  struct Part {
+    std::uint32_t begin;
+    std::uint32_t end;
+  };
+  static constexpr std::size_t partSize = 128;
+  static constexpr std::size_t fewRows = 4 * partSize;  ///< not worth the threads
+  std::span<const Part> parts() const { return parts_; }
 
   /// Body of each slot.
   std::span<const std::uint32_t> bodies() const { return bodyOfSlot_; }
@@ -83,33 +96,47 @@ class ContactColoring {
     });
   }
 
-  /// In one pass: a slot is new where its body appears first.
-  template <ContactBodies B>
-  void number(const B& bodies) {
+  /// Slots in the order of ids. Contacts come in the order of their first keys, so that only those bodies
+  /// that are first in none need to be sorted.
+  template <Real S, ContactBodies B>
+  void number(std::span<const Contact<S>> contacts, const B& bodies) {
     for (const std::uint32_t body : bodyOfSlot_) {
       slotOfBody_[body] = none;
     }
     slotOfBody_.resize(std::max(slotOfBody_.size(), bodies.size()), none);
+    ends_.clear();
+    const auto take = [&](std::uint32_t body, const std::uint64_t& id) {
+      if (slotOfBody_[body] == none) {
+        slotOfBody_[body] = 0;
+        ends_.push_back({id, body});
+      }
+    };
+    for (std::size_t k = 0; k < byContact_.size(); ++k) {
+      take(byContact_[k].slot1, contacts[k].key1);
+    }
+    const auto firsts = static_cast<std::ptrdiff_t>(ends_.size());
+    for (std::size_t k = 0; k < byContact_.size(); ++k) {
+      if (byContact_[k].slot2 != staticPartner) {
+        take(byContact_[k].slot2, contacts[k].key2);
+      }
+    }
+    std::sort(ends_.begin() + firsts, ends_.end());
+    std::inplace_merge(ends_.begin(), ends_.begin() + firsts, ends_.end());
     bodyOfSlot_.clear();
     movable_.clear();
-    degree_.clear();
-    const auto slot = [&](std::uint32_t body) {
-      std::uint32_t& s = slotOfBody_[body];
-      if (s == none) {
-        s = static_cast<std::uint32_t>(bodyOfSlot_.size());
-        bodyOfSlot_.push_back(body);
-        movable_.push_back(detail::isMovable(bodies, body) ? 1 : 0);
-        degree_.push_back(0);
-      }
-      degree_[s] += movable_[s];
-      return s;
-    };
-    for (Row& row : byContact_) {
-      row.slot1 = slot(row.slot1);
-      row.slot2 = row.slot2 == staticPartner ? none : slot(row.slot2);
+    for (const auto& [id, body] : ends_) {
+      slotOfBody_[body] = static_cast<std::uint32_t>(bodyOfSlot_.size());
+      bodyOfSlot_.push_back(body);
+      movable_.push_back(detail::isMovable(bodies, body) ? 1 : 0);
     }
     movable_.push_back(0);
-    degree_.push_back(0);
+    degree_.assign(movable_.size(), 0);
+    for (Row& row : byContact_) {
+      row.slot1 = slotOfBody_[row.slot1];
+      row.slot2 = row.slot2 == staticPartner ? staticSlot() : slotOfBody_[row.slot2];
+      degree_[row.slot1] += movable_[row.slot1];
+      degree_[row.slot2] += movable_[row.slot2];
+    }
   }
 
   void choose() {
@@ -118,7 +145,6 @@ class ContactColoring {
     detail::resizeSparingly(colour_, byContact_.size());
     for (std::size_t k = 0; k < byContact_.size(); ++k) {
       Row& row = byContact_[k];
-      row.slot2 = row.slot2 == none ? staticSlot() : row.slot2;
       if (degree_[row.slot1] <= 1 && degree_[row.slot2] <= 1) {
         colour_[k] = lone;
         continue;
@@ -169,15 +195,45 @@ class ContactColoring {
         rows_[places_[begin / chunk][colour_[k]]++] = byContact_[k];
       }
     });
+    cut();
+  }
+
+  /// The parts.
+  void cut() {
+    parts_.clear();
+    std::vector<std::pair<double, Part>> all;  // with where its middle stands in its colour, 0 … 1
+    const auto add = [&](std::size_t begin, std::size_t end) {
+      const std::size_t rows = end - begin;
+      const detail::Chunks chunks(rows, partSize);
+      for (std::size_t c = 0; c < chunks.count(); ++c) {
+        const std::size_t middle = chunks.begin(c) + chunks.end(c);
+        // Colours that are not shared all belong to the first thread.
+        const double place =
+            rows < fewRows ? 0.0 : static_cast<double>(middle) / static_cast<double>(2 * rows);
+        all.push_back({place,
+                       {static_cast<std::uint32_t>(begin + chunks.begin(c)),
+                        static_cast<std::uint32_t>(begin + chunks.end(c))}});
+      }
+    };
+    add(0, loneCount());
+    for (std::size_t colour = 0; colour <= colours(); ++colour) {
+      add(begin(colour), end(colour));
+    }
+    std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (const auto& part : all) {
+      parts_.push_back(part.second);
+    }
   }
 
   std::vector<Row> rows_;
   std::vector<Row> byContact_;
+  std::vector<Part> parts_;
   using Places = std::array<std::size_t, maxColours + 2>;
   std::vector<Places> places_;  ///< by part of the list
   std::vector<std::size_t> start_{0, 0};
   std::vector<std::uint32_t> bodyOfSlot_;
   std::vector<std::uint32_t> slotOfBody_;
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> ends_;  ///< ids and bodies
   std::vector<std::uint32_t> degree_;
   std::vector<std::uint8_t> movable_;
   std::vector<std::uint8_t> colour_;
@@ -190,20 +246,40 @@ namespace detail {
 /// body, shared between threads where they are many; parts depend on their number alone.
 template <class T, class F>
 T sumOverParts(std::size_t begin, std::size_t end, const T& zero, F&& f) {
-  constexpr std::size_t chunk = 128;  // small beside a colour's part of a thread: all end at once
   const auto run = [&](std::size_t from, std::size_t to) {
     T sum = zero;
     f(from, to, sum);
     return sum;
   };
-  if (end - begin < 4 * chunk) {  // not worth the threads
+  if (end - begin < ContactColoring::fewRows) {
     return run(begin, end);
   }
-  return orderedSum(end - begin, chunk, zero,
+  return orderedSum(end - begin, ContactColoring::partSize, zero,
                     [&](std::size_t from, std::size_t to) { return run(begin + from, begin + to); });
 }
 
-/// The same over all rows but the lone ones, colour after colour, and the overflow one by one.
+/// Calls f(from, to, sum) for all parts of the rows at once: they may share bodies.
+template <class T, class F>
+T sumOverAllParts(const ContactColoring& colouring, const T& zero, F&& f) {
+  return orderedSum(colouring.parts().size(), 1, zero, [&](std::size_t begin, std::size_t end) {
+    T sum = zero;
+    for (const ContactColoring::Part& part : colouring.parts().subspan(begin, end - begin)) {
+      f(std::size_t{part.begin}, std::size_t{part.end}, sum);
+    }
+    return sum;
+  });
+}
+
+/// The same without a sum.
+template <class F>
+void forAllParts(const ContactColoring& colouring, F&& f) {
+  parallelForTasks<Share::Alike>(colouring.parts().size(), [&](std::size_t p) {
+    const ContactColoring::Part& part = colouring.parts()[p];
+    f(std::size_t{part.begin}, std::size_t{part.end});
+  });
+}
+
+/// As sumOverParts() over all rows but the lone ones, colour after colour, and the overflow one by one.
 template <class T, class F>
 T sumOverColourParts(const ContactColoring& colouring, const T& zero, F&& f) {
   T sum = zero;

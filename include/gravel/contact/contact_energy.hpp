@@ -51,7 +51,6 @@ class ContactEnergy {
   using BodyLanes = detail::BodyLanes<S>;
   /// Losses along the normal and across it, work of drift, sum of the contacts' terms that are gains.
   using Sums = Eigen::Array<S, 4, 1>;
-  static constexpr std::size_t chunk = 512;
 
   /// Of an island.
   struct Gain {
@@ -111,12 +110,10 @@ class ContactEnergy {
 
   Sums takeDown(ContactProblem<S>& problem, const ContactColoring& colouring,
                 const ContactView<S>& contacts) {
-    return orderedSum(
-        problem.rows.size(), chunk, Sums(Sums::Zero()), [&](std::size_t begin, std::size_t end) {
-          Sums sums = Sums::Zero();
+    return detail::sumOverAllParts(
+        colouring, Sums(Sums::Zero()), [&](std::size_t begin, std::size_t end, Sums& sums) {
           forGroups(problem, colouring, begin, end,
                     [&](const Group& group) { sums += takeDown(problem, colouring, contacts, group); });
-          return sums;
         });
   }
 
@@ -184,7 +181,7 @@ class ContactEnergy {
       findIslands(colouring);
       known_ = true;
     }
-    findGains();
+    findGains(colouring);
     const bool any =
         std::any_of(gains_.begin(), gains_.end(), [](const Gain& gain) { return gain.isReal(); });
     if (any) {
@@ -216,25 +213,27 @@ class ContactEnergy {
   }
 
   /// Most rows that follow each other are of one island: each run of them is summed by itself.
-  void findGains() {
-    constexpr std::size_t piece = 2048;
-    const std::size_t pieces = (terms_.size() + piece - 1) / piece;
+  void findGains(const ContactColoring& colouring) {
+    constexpr std::size_t piece = 16;
+    const std::size_t pieces = (colouring.parts().size() + piece - 1) / piece;
     runs_.resize(std::max(runs_.size(), pieces));
-    parallelForChunks<Share::Alike>(terms_.size(), piece, [&](std::size_t begin, std::size_t end) {
+    parallelForChunks<Share::Alike>(colouring.parts().size(), piece, [&](std::size_t begin, std::size_t end) {
       std::vector<Run>& runs = runs_[begin / piece];
       runs.clear();
-      for (std::size_t k = begin; k < end;) {
-        Run run{islandOfRow_[k], {}};
-        for (; k < end && islandOfRow_[k] == run.island; ++k) {
-          run.gain.sum += terms_[k];
-          run.gain.size += terms_[k] < S(0) ? S(-terms_[k]) : terms_[k];
+      for (const ContactColoring::Part& part : colouring.parts().subspan(begin, end - begin)) {
+        for (std::size_t k = part.begin; k < part.end; ++k) {
+          if (runs.empty() || runs.back().island != islandOfRow_[k]) {
+            runs.push_back({islandOfRow_[k], {}});
+          }
+          Gain& gain = runs.back().gain;
+          gain.sum += terms_[k];
+          gain.size += terms_[k] < S(0) ? S(-terms_[k]) : terms_[k];
         }
-        runs.push_back(run);
       }
     });
     gains_.assign(islandOfSlot_.size(), Gain{});
-    for (std::size_t c = 0; c < pieces; ++c) {
-      for (const Run& run : runs_[c]) {
+    for (std::size_t p = 0; p < pieces; ++p) {
+      for (const Run& run : runs_[p]) {
         gains_[run.island].sum += run.gain.sum;
         gains_[run.island].size += run.gain.size;
       }
@@ -253,9 +252,11 @@ class ContactEnergy {
       parent = islandOfSlot_[parent];
     }
     detail::resizeAnew(islandOfRow_, colouring.rows().size());
-    parallelFor(islandOfRow_.size(), chunk, [&](std::size_t k) {
-      const ContactColoring::Row& row = colouring.rows()[k];
-      islandOfRow_[k] = islandOfSlot_[colouring.movable(row.slot1) ? row.slot1 : row.slot2];
+    detail::forAllParts(colouring, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t k = begin; k < end; ++k) {
+        const ContactColoring::Row& row = colouring.rows()[k];
+        islandOfRow_[k] = islandOfSlot_[colouring.movable(row.slot1) ? row.slot1 : row.slot2];
+      }
     });
   }
 

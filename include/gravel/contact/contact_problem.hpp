@@ -205,17 +205,19 @@ class ContactProblem : public detail::ProblemBodies<S> {
   template <class B, class Wanted>
   Most lookAtRows(const Taking<B>& taking, Wanted&& wanted) {
     const ContactColoring& colouring = taking.colouring;
-    return detail::sumOverParts(colouring.loneCount(), rows.size(), Most{},
-                                [&](std::size_t begin, std::size_t end, Most& part) {
-                                  detail::forGroupsOf<S>(
-                                      colouring, begin, end, [&](std::size_t k) { return wanted(k, part); },
-                                      [&](const Group& group) {
-                                        Lanes row = take(taking, group, part);
-                                        repeat(group, row);
-                                        put(group, row);
-                                        part += Most{S(0), wrongAt(group, row).largest(), group.count};
-                                      });
-                                });
+    return detail::sumOverAllParts(colouring, Most{}, [&](std::size_t begin, std::size_t end, Most& part) {
+      if (begin < colouring.loneCount()) {
+        return;
+      }
+      detail::forGroupsOf<S>(
+          colouring, begin, end, [&](std::size_t k) { return wanted(k, part); },
+          [&](const Group& group) {
+            Lanes row = take(taking, group, part);
+            repeat(group, row);
+            put(group, row);
+            part += Most{S(0), wrongAt(group, row).largest(), group.count};
+          });
+    });
   }
 
   /// By row, in the rows of a group.

@@ -22,7 +22,7 @@ bool ContactProblem<S>::isPassed(std::size_t k, const ContactColoring& colouring
 
 template <Real S>
 void ContactProblem<S>::recall(const ContactColoring& colouring) {
-  parallelForChunks<Share::Alike>(rows.size(), chunk, [&](std::size_t begin, std::size_t end) {
+  detail::forAllParts(colouring, [&](std::size_t begin, std::size_t end) {
     detail::forGroupsOf<S>(
         colouring, begin, end, [&](std::size_t k) { return !marks[k].taken; },
         [&](const Group& group) { storeImpulses(group, load(group, false)); });

@@ -82,7 +82,7 @@ const Material<S>& surfaceOf(std::span<const Material<S>> materials, std::uint32
   return materials[id];
 }
 
-inline constexpr std::size_t contactChunk = 2048;
+inline constexpr std::size_t contactChunk = 1024;
 
 /// Calls append(k, part, cursor) for k = 0 … n-1 in chunks. \return their number
 template <class Part, class Append>

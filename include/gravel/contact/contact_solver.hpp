@@ -176,22 +176,20 @@ class ContactSolver {
     changes_.back() = Vector3<S>::Zero();
     parallelFor(coloring_.bodies().size(), chunk,
                 [&](std::size_t slot) { changes_[slot] = dv(coloring_.bodies()[slot]); });
-    return orderedSum(rowImpulses_.size(), chunk, Sums(Sums::Zero()),
-                      [&](std::size_t begin, std::size_t end) {
-                        Sums sums = Sums::Zero();
-                        for (std::size_t r = begin; r < end; ++r) {
-                          const ContactColoring::Row& place = coloring_.rows()[r];
-                          const Vector3<S> change = changes_[place.slot2] - changes_[place.slot1];
-                          // None between two that fall alike: their row is not fetched. A user's scalar may
-                          // be more than its value, a derivative say.
-                          const bool any = !std::is_floating_point_v<S> || change != Vector3<S>::Zero();
-                          if (any && rowImpulses_.normal(r) > S(0)) {
-                            sums += Sums(rowImpulses_.normal(r) * problem_.rows[r].n.dot(change),
-                                         rowImpulses_.tangential(r).dot(change));
-                          }
-                        }
-                        return sums;
-                      });
+    return detail::sumOverAllParts(
+        coloring_, Sums(Sums::Zero()), [&](std::size_t begin, std::size_t end, Sums& sums) {
+          for (std::size_t r = begin; r < end; ++r) {
+            const ContactColoring::Row& place = coloring_.rows()[r];
+            const Vector3<S> change = changes_[place.slot2] - changes_[place.slot1];
+            // None between two that fall alike: their row is not fetched. A user's scalar may
+            // be more than its value, a derivative say.
+            const bool any = !std::is_floating_point_v<S> || change != Vector3<S>::Zero();
+            if (any && rowImpulses_.normal(r) > S(0)) {
+              sums += Sums(rowImpulses_.normal(r) * problem_.rows[r].n.dot(change),
+                           rowImpulses_.tangential(r).dot(change));
+            }
+          }
+        });
   }
   const ContactColoring& coloring() const { return coloring_; }
 

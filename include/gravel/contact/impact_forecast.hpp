@@ -36,7 +36,7 @@ class ImpactForecast {
 
   static bool after(const Event& a, const Event& b) { return comesAfter(a, b); }
 
-  static constexpr std::size_t chunk = 2048;
+  static constexpr std::size_t chunk = 1024;
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
   /// Motion of the second as seen from the first, `drift` of its image included.
@@ -63,7 +63,7 @@ class ImpactForecast {
     const std::size_t count = bodiesFrom + (n + chunk - 1) / chunk;
     parts_.resize(std::max(parts_.size(), count));
     swept_.gather(scene, scene.settings.h);
-    parallelForTasks(count, [&](std::size_t c) {
+    parallelForTasks<Share::Alike>(count, [&](std::size_t c) {
       parts_[c].clear();
       if (c < bodiesFrom) {
         predictPairs(scene, pairs.subspan(c * chunk, std::min(chunk, pairs.size() - c * chunk)), parts_[c]);

@@ -80,8 +80,11 @@ class PositionalCorrection {
     detail::resizeAnew(deep_, contacts.size());
     parallelFor(contacts.size(), chunk,
                 [&](std::size_t c) { deep_[c] = -contacts[c].gap > right / S(4) ? 1 : 0; });
-    parallelFor(contacts.size(), chunk,
-                [&](std::size_t k) { watch_.enterFirst(k, deep_[colouring.rows()[k].contact] == 0); });
+    detail::forAllParts(colouring, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t k = begin; k < end; ++k) {
+        watch_.enterFirst(k, deep_[colouring.rows()[k].contact] == 0);
+      }
+    });
     do {
       const auto open = [&](std::size_t begin, std::size_t end, Opened& sum) {
         const auto stale = [&](std::size_t k) {

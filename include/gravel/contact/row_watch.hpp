@@ -4,6 +4,7 @@
 /// Which contacts a sweep may pass over.
 
 #include <gravel/core/memory.hpp>
+#include <gravel/core/parallel.hpp>
 #include <gravel/core/types.hpp>
 
 #include <cstdint>
@@ -21,7 +22,8 @@ class RowWatch {
   /// \param still of the ways of both bodies together; below it a row is passed over
   void begin(std::size_t slots, std::size_t rows, const S& still) {
     still_ = still;
-    ways_.assign(slots, S(0));
+    resizeSparingly(ways_, slots);
+    parallelFor(slots, 2048, [&](std::size_t slot) { ways_[slot] = S(0); });
     resizeSparingly(then_, rows);
     holds_ = false;
   }

@@ -155,17 +155,18 @@ class SequentialImpulses : private detail::RowImpulses<S> {
   /// Steps of the first sweep: kept by none that stops there, or goes on with a few rows.
   void findSteps(const ContactProblem<S>& problem, const ContactColoring& colouring) {
     steps_.resize(problem.rows.size());
-    parallelForChunks<Share::Alike>(
-        problem.rows.size() - colouring.loneCount(), chunk, [&](std::size_t begin, std::size_t end) {
-          problem.forGroups(
-              colouring, colouring.loneCount() + begin, colouring.loneCount() + end, [&](const Group& group) {
-                const Lanes row = problem.load(group, true);
-                Lanes first = row;
-                problem.takeGuess(group, first, detail::BodyLanes<S>::load(problem.bodies, group.slot1),
-                                  detail::BodyLanes<S>::load(problem.bodies, group.slot2));
-                storeStep(group, {row.jt - first.jt, row.jn - first.jn});
-              });
-        });
+    detail::forAllParts(colouring, [&](std::size_t begin, std::size_t end) {
+      if (begin < colouring.loneCount()) {
+        return;
+      }
+      problem.forGroups(colouring, begin, end, [&](const Group& group) {
+        const Lanes row = problem.load(group, true);
+        Lanes first = row;
+        problem.takeGuess(group, first, detail::BodyLanes<S>::load(problem.bodies, group.slot1),
+                          detail::BodyLanes<S>::load(problem.bodies, group.slot2));
+        storeStep(group, {row.jt - first.jt, row.jn - first.jn});
+      });
+    });
   }
 
   void begin(const ContactProblem<S>& problem) {

@@ -61,7 +61,7 @@ class SweptSpheres {
   }
 
  private:
-  static constexpr std::size_t chunk = 2048;
+  static constexpr std::size_t chunk = 512;
 
   /// In double half a cache line.
   struct alignas(alignof(S) > 32 ? alignof(S) : 32) Sphere {

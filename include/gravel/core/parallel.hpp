@@ -7,7 +7,10 @@
 /// the lowest chunk first.
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <cstddef>
+#include <cstdint>
 #include <exception>
 #include <limits>
 #include <type_traits>
@@ -57,6 +60,73 @@ class FirstError {
   std::exception_ptr error_;
 };
 
+#ifdef _OPENMP
+/// Tasks 0 … count-1 in as many parts as there are threads: each takes its own from the front, and when there
+/// are none left, those of others from the back. So a thread has the same tasks in every pass, but for a few
+/// where it is slower or faster than others: cores differ, and may have other work.
+class OwnTasks {
+ public:
+  OwnTasks(std::size_t count, std::size_t threads) : parts_(threads) {
+    for (std::size_t t = 0; t < threads; ++t) {
+      const auto bound = [&](std::size_t k) {
+        return static_cast<std::uint32_t>(count / threads * k + count % threads * k / threads);
+      };
+      parts_[t].left.store(pack(bound(t), bound(t + 1)), std::memory_order_relaxed);
+    }
+  }
+
+  /// Calls f(task) for what is left to thread `own`. Called once by each thread of a team, of any size.
+  template <class F>
+  void run(std::size_t own, F&& f) {
+    std::uint32_t task = 0;
+    for (std::size_t k = 0; k < parts_.size(); ++k) {
+      std::atomic<std::uint64_t>& left = parts_[(own + k) % parts_.size()].left;
+      while (k == 0 ? takeFirst(left, task) : takeLast(left, task)) {
+        f(task);
+      }
+    }
+  }
+
+ private:
+  struct Part {
+    std::atomic<std::uint64_t> left;   ///< begin and end of what is left
+    std::array<char, 56> otherLine{};  ///< no two parts in one line of the cache
+  };
+  static constexpr std::uint64_t pack(std::uint32_t begin, std::uint32_t end) {
+    return (std::uint64_t{end} << 32U) | begin;
+  }
+  static bool takeFirst(std::atomic<std::uint64_t>& left, std::uint32_t& task) {
+    return take(left, [&](std::uint32_t begin, std::uint32_t end) {
+      task = begin;
+      return pack(begin + 1, end);
+    });
+  }
+  static bool takeLast(std::atomic<std::uint64_t>& left, std::uint32_t& task) {
+    return take(left, [&](std::uint32_t begin, std::uint32_t end) {
+      task = end - 1;
+      return pack(begin, end - 1);
+    });
+  }
+  /// Which task is whose is all that is agreed on here; what tasks do is ordered by the end of the region.
+  template <class Next>
+  static bool take(std::atomic<std::uint64_t>& left, Next&& next) {
+    std::uint64_t now = left.load(std::memory_order_relaxed);
+    while (true) {
+      const auto begin = static_cast<std::uint32_t>(now);
+      const auto end = static_cast<std::uint32_t>(now >> 32U);
+      if (begin >= end) {
+        return false;
+      }
+      if (left.compare_exchange_weak(now, next(begin, end), std::memory_order_relaxed)) {
+        return true;
+      }
+    }
+  }
+
+  std::vector<Part> parts_;
+};
+#endif
+
 /// [0, n) in consecutive pieces of `size`, the last one shorter; a size of 0 counts as 1. No n or size
 /// overflows.
 struct Chunks {
@@ -74,8 +144,8 @@ struct Chunks {
 /// How chunks find their threads; no result depends on it.
 enum class Share {
   AsFree,  ///< each to a thread that has nothing to do: where some take much longer than others
-  /// Neighbours to one thread, and the same ones in every pass over as many: where passes follow each other
-  /// over the same memory, which so stays in the caches of one core.
+  /// Neighbours to one thread, and nearly the same ones in every pass over as many: where passes follow each
+  /// other over the same memory, which so stays in the caches of one core.
   Alike
 };
 
@@ -100,13 +170,12 @@ void parallelForTasks(std::size_t count, F&& f) {
       error.keep(static_cast<std::size_t>(c), std::current_exception());
     }
   };
-  if constexpr (share == Share::AsFree) {
-#pragma omp parallel for schedule(dynamic, 1)
-    for (std::ptrdiff_t c = 0; c < last; ++c) {
-      call(c);
-    }
+  if (share == Share::Alike && count < std::numeric_limits<std::uint32_t>::max()) {
+    detail::OwnTasks tasks(count, static_cast<std::size_t>(threadCount()));
+#pragma omp parallel
+    tasks.run(static_cast<std::size_t>(omp_get_thread_num()), call);
   } else {
-#pragma omp parallel for schedule(static)
+#pragma omp parallel for schedule(dynamic, 1)
     for (std::ptrdiff_t c = 0; c < last; ++c) {
       call(c);
     }
@@ -122,8 +191,8 @@ void parallelForChunks(std::size_t n, std::size_t chunk, F&& f) {
   parallelForTasks<share>(chunks.count(), [&](std::size_t c) { f(chunks.begin(c), chunks.end(c)); });
 }
 
-/// Calls f(i) for i = 0 … n-1, all about equally dear, each thread its part of the range. `grain` is how many
-/// calls are worth a chunk of their own: about a microsecond's work or more.
+/// Calls f(i) for i = 0 … n-1, all about equally dear. `grain` is how many calls are worth a chunk of their
+/// own: about five microseconds' work, as much as a parallel region takes to begin and end.
 template <class F>
 void parallelFor(std::size_t n, std::size_t grain, F&& f) {
   parallelForChunks<Share::Alike>(n, grain, [&](std::size_t begin, std::size_t end) {

@@ -12,7 +12,7 @@ namespace gravel {
 
 namespace detail {
 
-constexpr std::size_t bodyGrain = 2048;
+constexpr std::size_t bodyGrain = 512;
 
 /// v += a kick; then x += v drift, and the orientation with it, of one body; one that is held stays.
 template <Real Scalar, class Layout>

@@ -130,7 +130,7 @@ void ContactStage<Scalar, Layout>::renewGeometry(const Bodies& bodies, const Con
   for (const Displacement<Scalar>& d : solver_.displacements()) {
     wasMoved_[d.body] = 1;
   }
-  parallelFor(contacts_.size(), 1024, [&](std::size_t k) {
+  parallelFor(contacts_.size(), 512, [&](std::size_t k) {
     Contact<Scalar>& c = contacts_[k];
     if (wasMoved_[c.first] == 0 && (c.second == staticPartner || wasMoved_[c.second] == 0)) {
       return;

@@ -275,7 +275,7 @@ class NeighbourList {
     return std::min(std::max(S(S(goodLife) * perUpdate), thinnest), thickest);
   }
 
-  static constexpr std::size_t chunk = 1024;
+  static constexpr std::size_t chunk = 512;
   /// A search costs about as much as this many comparisons of one body with all others.
   static constexpr std::size_t mostComparisons = 128;
   static std::size_t mostSwift(std::size_t n) { return std::min<std::size_t>(8, n / 64); }
