@@ -39,7 +39,7 @@ class ContactColoring {
   template <Real S, ContactBodies B>
   void build(std::span<const Contact<S>> contacts, const B& bodies) {
     takeEnds(contacts, bodies.size());
-    number(contacts, bodies);
+    number(bodies);
     choose();
     arrange();
   }
@@ -98,36 +98,36 @@ class ContactColoring {
 
   /// Slots in the order of ids. Contacts come in the order of their first keys, so that only those bodies
   /// that are first in none need to be sorted.
-  template <Real S, ContactBodies B>
-  void number(std::span<const Contact<S>> contacts, const B& bodies) {
+  template <ContactBodies B>
+  void number(const B& bodies) {
     for (const std::uint32_t body : bodyOfSlot_) {
       slotOfBody_[body] = none;
     }
     slotOfBody_.resize(std::max(slotOfBody_.size(), bodies.size()), none);
-    ends_.clear();
-    const auto take = [&](std::uint32_t body, const std::uint64_t& id) {
+    bodyOfSlot_.clear();
+    const auto take = [&](std::uint32_t body) {
       if (slotOfBody_[body] == none) {
         slotOfBody_[body] = 0;
-        ends_.push_back({id, body});
+        bodyOfSlot_.push_back(body);
       }
     };
-    for (std::size_t k = 0; k < byContact_.size(); ++k) {
-      take(byContact_[k].slot1, contacts[k].key1);
+    for (const Row& row : byContact_) {
+      take(row.slot1);
     }
-    const auto firsts = static_cast<std::ptrdiff_t>(ends_.size());
-    for (std::size_t k = 0; k < byContact_.size(); ++k) {
-      if (byContact_[k].slot2 != staticPartner) {
-        take(byContact_[k].slot2, contacts[k].key2);
+    const auto firsts = static_cast<std::ptrdiff_t>(bodyOfSlot_.size());
+    for (const Row& row : byContact_) {
+      if (row.slot2 != staticPartner) {
+        take(row.slot2);
       }
     }
-    std::sort(ends_.begin() + firsts, ends_.end());
-    std::inplace_merge(ends_.begin(), ends_.begin() + firsts, ends_.end());
-    bodyOfSlot_.clear();
+    auto&& ids = bodies.ids();
+    const auto before = [&](std::uint32_t a, std::uint32_t b) { return ids[a] < ids[b]; };
+    std::sort(bodyOfSlot_.begin() + firsts, bodyOfSlot_.end(), before);
+    std::inplace_merge(bodyOfSlot_.begin(), bodyOfSlot_.begin() + firsts, bodyOfSlot_.end(), before);
     movable_.clear();
-    for (const auto& [id, body] : ends_) {
-      slotOfBody_[body] = static_cast<std::uint32_t>(bodyOfSlot_.size());
-      bodyOfSlot_.push_back(body);
-      movable_.push_back(detail::isMovable(bodies, body) ? 1 : 0);
+    for (std::uint32_t slot = 0; slot < staticSlot(); ++slot) {
+      slotOfBody_[bodyOfSlot_[slot]] = slot;
+      movable_.push_back(detail::isMovable(bodies, bodyOfSlot_[slot]) ? 1 : 0);
     }
     movable_.push_back(0);
     degree_.assign(movable_.size(), 0);
@@ -233,7 +233,6 @@ class ContactColoring {
   std::vector<std::size_t> start_{0, 0};
   std::vector<std::uint32_t> bodyOfSlot_;
   std::vector<std::uint32_t> slotOfBody_;
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> ends_;  ///< ids and bodies
   std::vector<std::uint32_t> degree_;
   std::vector<std::uint8_t> movable_;
   std::vector<std::uint8_t> colour_;
