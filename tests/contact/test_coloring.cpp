@@ -96,7 +96,7 @@ void checkParts(const ContactColoring& coloring) {
         return (static_cast<double>(next[k] - begin) + more) / static_cast<double>(end - begin);
       };
       const auto isShared = [&](std::size_t k) {
-        return groups[k].second - groups[k].first >= ContactColoring::fewRows;
+        return k + 1 < groups.size() && groups[k].second - groups[k].first >= ContactColoring::fewRows;
       };
       if (isShared(own) && isShared(g)) {
         constexpr double size = ContactColoring::partSize;
@@ -321,6 +321,27 @@ TEST_CASE("colours, and the order within one, are those of one walk along a list
     CHECK(std::is_sorted(coloring.bodies().begin(), coloring.bodies().end()));
   }
   omp_set_num_threads(before);
+}
+
+// Seen to fail: a task for each part.
+TEST_CASE("passes over all rows open no parallel region where no colour is shared between threads") {
+  const Bodies<double, SoA> bodies = randomCloud<double>(500, 7.0, 8);
+  const auto contacts = contactsOf<double>(bodies, Material<double>{}, {{{0, 0, 1}, -3, {}}});
+  ContactColoring coloring;
+  coloring.build(std::span<const Contact<double>>(contacts), bodies);
+  REQUIRE(coloring.parts().size() > 4);
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(2);
+  int inside = 0;
+  const std::size_t rows = detail::sumOverAllParts(coloring, std::size_t{0},
+                                                   [&](std::size_t begin, std::size_t end, std::size_t& sum) {
+                                                     inside += omp_in_parallel();
+                                                     sum += end - begin;
+                                                   });
+  detail::forAllParts(coloring, [&](std::size_t, std::size_t) { inside += omp_in_parallel(); });
+  omp_set_num_threads(before);
+  CHECK(rows == contacts.size());
+  CHECK(inside == 0);
 }
 
 // Seen to fail: slots numbered as their bodies appear.

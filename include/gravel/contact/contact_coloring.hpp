@@ -22,7 +22,8 @@ namespace gravel {
 /// alone. Fixed bodies and boundaries take part in any number of contacts of a colour. Contacts that find no
 /// colour among 62 (of a body with very many partners) go to an overflow group that is solved serially.
 /// Contacts that share no movable body with any other make up a group of their own, the lone ones, which are
-/// exact after one blow. Keeps its workspace; O(contacts), and O(bodies) once for the largest number of them.
+/// exact after one blow. Keeps most of its workspace; O(contacts), with a sort of those bodies that are first
+/// in no contact, and O(bodies) once for the largest number of them.
 class ContactColoring {
  public:
   static constexpr std::size_t maxColours = 62;
@@ -35,6 +36,7 @@ class ContactColoring {
     std::uint32_t slot2;
   };
 
+  /// \param contacts sorted by keys, which are the ids of the bodies
   /// \throws std::invalid_argument for a contact of a body that is not there, or of a body with itself
   template <Real S, ContactBodies B>
   void build(std::span<const Contact<S>> contacts, const B& bodies) {
@@ -55,9 +57,9 @@ class ContactColoring {
   std::size_t end(std::size_t colour) const { return start_[colour + 1]; }
 
   /// All rows, for passes over them in which contacts may share bodies: parts of up to `partSize` rows of one
-  /// colour, those first that stand first in their colours. So a thread that takes its share of the parts has
-  /// about the rows, and the bodies, that it has when colours are shared between threads one by one, and they
-  /// stay in its cache.
+  /// group (a colour, the lone ones, the overflow), those first that stand first in their groups. So a thread
+  /// that takes its share of the parts has about the rows, and the bodies, that it has when colours are
+  /// shared between threads one by one, and they stay in its cache.
   struct Part {
     std::uint32_t begin;
     std::uint32_t end;
@@ -65,6 +67,8 @@ class ContactColoring {
   static constexpr std::size_t partSize = 128;
   static constexpr std::size_t fewRows = 4 * partSize;  ///< not worth the threads
   std::span<const Part> parts() const { return parts_; }
+  /// How many parts are worth a task: all of them where threads share no group of rows.
+  std::size_t partsOfTask() const { return shared_ ? 1 : std::max<std::size_t>(1, parts_.size()); }
 
   /// Body of each slot.
   std::span<const std::uint32_t> bodies() const { return bodyOfSlot_; }
@@ -201,23 +205,25 @@ class ContactColoring {
   /// The parts.
   void cut() {
     parts_.clear();
-    std::vector<std::pair<double, Part>> all;  // with where its middle stands in its colour, 0 … 1
-    const auto add = [&](std::size_t begin, std::size_t end) {
+    shared_ = false;
+    std::vector<std::pair<double, Part>> all;  // with where its middle stands in its group, 0 … 1
+    const auto add = [&](std::size_t begin, std::size_t end, bool serial) {
       const std::size_t rows = end - begin;
       const detail::Chunks chunks(rows, partSize);
+      const bool isShared = rows >= fewRows && !serial;
+      shared_ = shared_ || isShared;
       for (std::size_t c = 0; c < chunks.count(); ++c) {
         const std::size_t middle = chunks.begin(c) + chunks.end(c);
-        // Colours that are not shared all belong to the first thread.
-        const double place =
-            rows < fewRows ? 0.0 : static_cast<double>(middle) / static_cast<double>(2 * rows);
+        // Groups that are not shared are the calling thread's: it begins with them.
+        const double place = isShared ? static_cast<double>(middle) / static_cast<double>(2 * rows) : 0.0;
         all.push_back({place,
                        {static_cast<std::uint32_t>(begin + chunks.begin(c)),
                         static_cast<std::uint32_t>(begin + chunks.end(c))}});
       }
     };
-    add(0, loneCount());
+    add(0, loneCount(), false);
     for (std::size_t colour = 0; colour <= colours(); ++colour) {
-      add(begin(colour), end(colour));
+      add(begin(colour), end(colour), colour == colours());
     }
     std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
     for (const auto& part : all) {
@@ -228,6 +234,7 @@ class ContactColoring {
   std::vector<Row> rows_;
   std::vector<Row> byContact_;
   std::vector<Part> parts_;
+  bool shared_ = false;  ///< any group is shared between threads
   using Places = std::array<std::size_t, maxColours + 2>;
   std::vector<Places> places_;  ///< by part of the list
   std::vector<std::size_t> start_{0, 0};
@@ -260,19 +267,21 @@ T sumOverParts(std::size_t begin, std::size_t end, const T& zero, F&& f) {
 /// Calls f(from, to, sum) for all parts of the rows at once: they may share bodies.
 template <class T, class F>
 T sumOverAllParts(const ContactColoring& colouring, const T& zero, F&& f) {
-  return orderedSum(colouring.parts().size(), 1, zero, [&](std::size_t begin, std::size_t end) {
-    T sum = zero;
-    for (const ContactColoring::Part& part : colouring.parts().subspan(begin, end - begin)) {
-      f(std::size_t{part.begin}, std::size_t{part.end}, sum);
-    }
-    return sum;
-  });
+  return orderedSum(colouring.parts().size(), colouring.partsOfTask(), zero,
+                    [&](std::size_t begin, std::size_t end) {
+                      T sum = zero;
+                      for (std::size_t p = begin; p < end; ++p) {
+                        const ContactColoring::Part& part = colouring.parts()[p];
+                        f(std::size_t{part.begin}, std::size_t{part.end}, sum);
+                      }
+                      return sum;
+                    });
 }
 
 /// The same without a sum.
 template <class F>
 void forAllParts(const ContactColoring& colouring, F&& f) {
-  parallelForTasks<Share::Alike>(colouring.parts().size(), [&](std::size_t p) {
+  parallelFor(colouring.parts().size(), colouring.partsOfTask(), [&](std::size_t p) {
     const ContactColoring::Part& part = colouring.parts()[p];
     f(std::size_t{part.begin}, std::size_t{part.end});
   });

@@ -214,7 +214,7 @@ class ContactEnergy {
 
   /// Most rows that follow each other are of one island: each run of them is summed by itself.
   void findGains(const ContactColoring& colouring) {
-    constexpr std::size_t piece = 16;
+    const std::size_t piece = std::max<std::size_t>(16, colouring.partsOfTask());
     const std::size_t pieces = (colouring.parts().size() + piece - 1) / piece;
     runs_.resize(std::max(runs_.size(), pieces));
     parallelForChunks<Share::Alike>(colouring.parts().size(), piece, [&](std::size_t begin, std::size_t end) {

@@ -106,7 +106,7 @@ class PositionalCorrection {
     return report;
   }
 
-  /// Who was moved by the last call, in the order of contacts.
+  /// Who was moved by the last call, in the order of ids.
   const std::vector<Displacement<S>>& displacements() const { return moved_; }
 
  private:

@@ -23,6 +23,7 @@ class RowWatch {
   void begin(std::size_t slots, std::size_t rows, const S& still) {
     still_ = still;
     resizeSparingly(ways_, slots);
+    // By all threads, since each goes on with its own part.
     parallelFor(slots, 2048, [&](std::size_t slot) { ways_[slot] = S(0); });
     resizeSparingly(then_, rows);
     holds_ = false;
