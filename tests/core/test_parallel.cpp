@@ -148,6 +148,7 @@ TEST_CASE("parallel: with two threads two chunks run at the same time", "[parall
   CHECK(met == 2);
 }
 
+// Seen to fail: parts without what is left over of tasks by threads.
 TEST_CASE("parallel: each of the tasks that are shared alike is done once, for more threads and for fewer",
           "[parallel]") {
   for (const int threads : {1, 2, 3, 8, 70}) {
