@@ -28,7 +28,8 @@ if(GRAVEL_SANITIZE)
   target_compile_options(gravel_own INTERFACE ${gravel_sanitizer_flags})
   target_link_options(gravel_own INTERFACE ${gravel_sanitizer_flags})
   if(CMAKE_CXX_COMPILER_ID MATCHES "Clang")
-    # Its optimiser of OpenMP takes two fifths of the compile time of a Space (clang 14); results need none.
+    # Builds under sanitizers are not for speed: clang's optimiser of OpenMP takes two fifths of their compile
+    # time (a Space with clang 14 -O2: 148 s with it, 86 s without).
     target_compile_options(gravel_own INTERFACE "SHELL:-mllvm -openmp-opt-disable")
   endif()
   if("address" IN_LIST GRAVEL_SANITIZE)
