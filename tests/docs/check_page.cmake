@@ -1,10 +1,12 @@
 # cmake -DCOMPILER=<c++> -DINCLUDES=<folder|folder> -DOPTIONS=<options> -DPAGE=<file.md> -DWORK=<folder>
-#       -P check_page.cmake
+#       "-DSPACE=<object file>" -P check_page.cmake
 #
 # Compiles the C++ of a Markdown page, so that what a reader copies works. A ```cpp block with `int main` is a
 # program: it is built and run, and must print what the next ```text block of the page shows, if one follows before
 # the next ```cpp block. Any other ```cpp block is part of a function's body, in which `config` and `space` exist;
-# those of a page are compiled together. A page without a ```cpp block fails: then nothing was checked.
+# those of a page are compiled together. A page without a ```cpp block fails: then nothing was checked. The code of
+# Space<double> comes from SPACE, as each page would take half a minute to compile it once more; that declaration
+# stands behind the page's own code, which so has to include all that it needs.
 cmake_minimum_required(VERSION 3.25)
 
 file(REMOVE_RECURSE "${WORK}")
@@ -16,6 +18,8 @@ list(REMOVE_ITEM includes /usr/include)  # -isystem would put it before the stan
 foreach(include IN LISTS includes)
   list(APPEND compile -isystem "${include}")
 endforeach()
+
+set(spaces "\nnamespace gravel {\nextern template class Space<double, SoA>;\n}\n")
 
 # Sets ${block} to the first block of `language` in ${text}, ${before} and ${after} to what stands around it.
 macro(next_block language text)
@@ -55,8 +59,13 @@ while(TRUE)
 
   math(EXPR program_count "${program_count} + 1")
   set(program "${WORK}/program${program_count}")
+  set(objects "")
+  if(code MATCHES "#include <gravel/gravel.hpp>")
+    string(APPEND code "${spaces}")
+    set(objects "${SPACE}")
+  endif()
   file(WRITE "${program}.cpp" "${code}")
-  execute_process(COMMAND ${compile} "${program}.cpp" -o "${program}" RESULT_VARIABLE result ERROR_VARIABLE output)
+  execute_process(COMMAND ${compile} "${program}.cpp" ${objects} -o "${program}" RESULT_VARIABLE result ERROR_VARIABLE output)
   if(NOT result EQUAL 0)
     message(FATAL_ERROR "${PAGE}: program ${program_count} does not compile:\n${output}")
   endif()
@@ -77,7 +86,7 @@ while(TRUE)
 endwhile()
 
 if(fragment_count GREATER 0)
-  file(WRITE "${WORK}/fragments.cpp" "${fragments}")
+  file(WRITE "${WORK}/fragments.cpp" "${fragments}${spaces}")
   execute_process(COMMAND ${compile} -fsyntax-only "${WORK}/fragments.cpp" RESULT_VARIABLE result ERROR_VARIABLE output)
   if(NOT result EQUAL 0)
     message(FATAL_ERROR "${PAGE}: a fragment does not compile (in ${WORK}/fragments.cpp):\n${output}")
