@@ -375,13 +375,19 @@ Scene readScene(const std::string& text, const std::string& file) {
 
 Scene readSceneFile(const std::string& path) {
   std::error_code ignored;
+  if (!std::filesystem::exists(path, ignored)) {
+    throw SceneError(path + ": there is no such file");
+  }
   if (std::filesystem::is_directory(path, ignored)) {
     throw SceneError(path + ": is a folder; allowed: a scene file");
   }
   std::ifstream in(path, std::ios::binary);
+  if (!in) {
+    throw SceneError(path + ": cannot be read");
+  }
   std::stringstream text;
-  if (!in || !(text << in.rdbuf())) {
-    throw SceneError(path + ": cannot be read, or is empty");
+  if (!(text << in.rdbuf())) {
+    throw SceneError(path + ": is empty");
   }
   return readScene(text.str(), path);
 }

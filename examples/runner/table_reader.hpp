@@ -289,7 +289,7 @@ class TableReader {
     }
     const double x = *node.value<double>();
     if (!range.contains(x)) {
-      return fault(node, key, detail::formatReal(x), range.text);
+      return fault(node, key, detail::formatReal(x), range.allowed(x));
     }
     value = x;
     return true;

@@ -133,6 +133,47 @@ TEST_CASE("Velocities of the user's own are what the bodies leave with, at the t
   }
 }
 
+// On the way to each other, and touching already: asked by who deals impacts, and by who solves contacts.
+TEST_CASE(
+    "What a collision hook says that is no outcome is refused with its body, and a later step goes on") {
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  const Vec still = Vec::Zero();
+  const auto refusal = [&](double distance, const Outcome& outcome, bool fixed) {
+    Space<double> space(bouncy(0.01));
+    Body<double> one = ball({0, 0, 0}, {0, 0, 0}, 0.5, 1.0);
+    one.fixed = fixed;
+    space.addBody(one);
+    space.addBody(ball({-distance, 0, 0}, {1, 0, 0}, 0.5, 1.0));
+    space.setCollisionHook([&](const Hit&) { return outcome; });
+    std::string message;
+    try {
+      advance(space, 1);
+    } catch (const std::invalid_argument& error) {
+      message = error.what();
+    }
+    space.setCollisionHook({});
+    advance(space, 10);
+    CHECK(isFinite(space.body(0).velocity()));
+    CHECK(isFinite(space.body(1).velocity()));
+    return message;
+  };
+  for (const double distance : {1.004, 1.0 - 1e-9}) {
+    CHECK_THAT(
+        refusal(distance, Outcome::velocities({0, none, 0}, still, still, still), false),
+        ContainsSubstring("velocity from the collision hook for body 0 is (0, nan, 0); allowed: finite"));
+    CHECK_THAT(
+        refusal(distance,
+                Outcome::velocities(still, still, still, {0, 0, std::numeric_limits<double>::infinity()}),
+                false),
+        ContainsSubstring("angular velocity from the collision hook for body 1 is (0, 0, inf)"));
+    CHECK_THAT(refusal(distance, {.kind = static_cast<CollisionKind>(9)}, false),
+               ContainsSubstring("kind of a collision's outcome is 9"));
+    // Those of a fixed body count nothing.
+    CHECK(
+        refusal(distance, Outcome::velocities({none, 0, 0}, {0, none, 0}, {-1, 0, 0}, still), true).empty());
+  }
+}
+
 TEST_CASE("What meets a fixed body merges into it") {
   Space<double> space(bouncy(0.01));
   Body<double> wall = ball({0, 0, 0}, {0, 0, 0}, 0.5, 0.1);

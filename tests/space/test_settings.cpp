@@ -211,6 +211,15 @@ TEST_CASE("Fields that contradict each other are told as well") {
   CHECK(space.getTimeStep() == 1e-3);
 }
 
+TEST_CASE("A number above zero that is too small is told the least one") {
+  Space<double> space{Config{}};
+  const double least = std::numeric_limits<double>::min();
+  CHECK_THROWS_WITH(space.setTimeStep(least / 2),
+                    ContainsSubstring("allowed: finite, > 0, at least 2.2250738585072014e-308"));
+  CHECK_NOTHROW(space.setTimeStep(least));
+  CHECK_THROWS_WITH(space.setTimeStep(0), ContainsSubstring("finite, > 0") && !ContainsSubstring("at least"));
+}
+
 TEST_CASE("Every setting is visited once, with a name and a unit") {
   const Config config;
   std::vector<std::string> names;

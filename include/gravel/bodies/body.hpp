@@ -52,7 +52,7 @@ void validate(const Body<Scalar>& body, const std::string& who) {
   };
   const auto real = [&](const char* field, const Scalar& x, const detail::Range<Scalar>& range) {
     if (!range.contains(x)) {
-      detail::refuse(std::string(field) + " of " + who, detail::formatReal(x), range.text);
+      detail::refuse(std::string(field) + " of " + who, detail::formatReal(x), range.allowed(x));
     }
   };
   finite("position", body.position);

@@ -7,6 +7,7 @@
 #include <gravel/contact/impulses.hpp>
 #include <gravel/contact/material.hpp>
 #include <gravel/core/callback.hpp>
+#include <gravel/core/check.hpp>
 
 namespace gravel {
 
@@ -65,8 +66,9 @@ struct CollisionOutcome {
 };
 
 /// The user's own outcome of the collisions of two bodies. It is called from one thread, once for each impact
-/// in the order in which they are dealt, and must neither throw nor change the space. Contacts that rest are
-/// no collisions.
+/// in the order in which they are dealt, and must not change the space. Contacts that rest are no collisions.
+/// What it throws, or a velocity that is not finite (std::invalid_argument), ends the step half way: bodies
+/// have moved then, and the time has not.
 template <Real Scalar>
 using CollisionHook = Callback<CollisionOutcome<Scalar>(const Collision<Scalar>&)>;
 
@@ -84,6 +86,30 @@ CollisionHook<Scalar> mergeBelowEscapeSpeed(const Scalar& G, const Scalar& facto
 }
 
 namespace detail {
+
+/// What the hook says of a collision.
+/// \throws std::invalid_argument unless the velocities that bodies are to have are finite
+template <Real Scalar>
+CollisionOutcome<Scalar> outcomeOf(const CollisionHook<Scalar>& hook, const Collision<Scalar>& hit) {
+  const CollisionOutcome<Scalar> outcome = hook(hit);
+  if (outcome.kind > CollisionKind::Velocities) {
+    refuse("kind of a collision's outcome", std::to_string(static_cast<int>(outcome.kind)),
+           "a value of its enumeration");
+  }
+  const auto require = [](const char* what, const typename Collision<Scalar>::Partner& side,
+                          const Vector3<Scalar>& v) {
+    if (!side.fixed && !isFinite(v)) {
+      refuse(what + std::to_string(toInteger(side.id)), formatVector(v), "finite");
+    }
+  };
+  if (outcome.kind == CollisionKind::Velocities) {
+    require("velocity from the collision hook for body ", hit.first, outcome.velocity1);
+    require("velocity from the collision hook for body ", hit.second, outcome.velocity2);
+    require("angular velocity from the collision hook for body ", hit.first, outcome.angularVelocity1);
+    require("angular velocity from the collision hook for body ", hit.second, outcome.angularVelocity2);
+  }
+  return outcome;
+}
 
 /// The cube root of 1 <= x <= 2 by Newton's method, for any scalar.
 template <Real Scalar>

@@ -58,7 +58,7 @@ ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, con
     const Collision<S> hit{
         time,    partner(c.first, c.key1), partner(c.second, c.key2), c.normal, v_rel, contacts.material(c),
         approach};
-    const CollisionOutcome<S> outcome = hook(hit);
+    const CollisionOutcome<S> outcome = detail::outcomeOf(hook, hit);
     if (outcome.kind == CollisionKind::Merge) {
       outcomes.merges.emplace_back(c.key1, c.key2);
     } else if (outcome.kind == CollisionKind::Velocities) {

@@ -44,7 +44,7 @@ template <Real Scalar>
 void validate(const Material<Scalar>& material, const std::string& who) {
   const auto check = [&](const char* field, const Scalar& x, const detail::Range<Scalar>& range) {
     if (!range.contains(x)) {
-      detail::refuse(std::string(field) + " of " + who, detail::formatReal(x), range.text);
+      detail::refuse(std::string(field) + " of " + who, detail::formatReal(x), range.allowed(x));
     }
   };
   check("restitution", material.restitution, detail::unitInterval<Scalar>());

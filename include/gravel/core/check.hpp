@@ -54,6 +54,10 @@ struct Range {
   const char* text;  ///< as it stands in messages, for example "finite, >= 0"
 
   bool contains(const Scalar& x) const { return isFinite(x) && x >= low && x <= high; }
+  /// The text of a message about x, which may be above zero and yet too small.
+  std::string allowed(const Scalar& x) const {
+    return x > Scalar(0) && x < low ? text + (", at least " + formatReal(low)) : std::string(text);
+  }
 };
 
 template <Real Scalar>
@@ -82,7 +86,7 @@ inline Range<Scalar> unitInterval() {
 template <Real Scalar>
 inline void require(const char* subject, const Scalar& x, const Range<Scalar>& range) {
   if (!range.contains(x)) {
-    refuse(subject, formatReal(x), range.text);
+    refuse(subject, formatReal(x), range.allowed(x));
   }
 }
 

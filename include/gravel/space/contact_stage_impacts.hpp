@@ -98,9 +98,10 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
                                                    v,
                                                    Vector3<Scalar>(bodies.angularVelocities()[i])};
       };
-      return collisionHook(Collision<Scalar>{
-          Scalar(time + impact.time), partner(impact.first, impact.key1, v1),
-          partner(impact.second, impact.key2, v2), impact.normal, v_rel, material, impact.speed});
+      return detail::outcomeOf(
+          collisionHook, Collision<Scalar>{Scalar(time + impact.time), partner(impact.first, impact.key1, v1),
+                                           partner(impact.second, impact.key2, v2), impact.normal, v_rel,
+                                           material, impact.speed});
     };
     blows = impacts_.resolve(bodies, near, domain, surfaces, walls, held, settings, nearBoundaries(bodies, h),
                              course, decide, support);

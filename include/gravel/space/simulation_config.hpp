@@ -141,7 +141,7 @@ void SimulationConfig<Scalar>::validate() const {
   forEachSetting(*this, [&]<class T>(const Setting<Scalar>& setting, const T& value) {
     if constexpr (std::is_same_v<T, Scalar>) {
       if (!setting.range.contains(value)) {
-        fault(setting.name, detail::formatReal(value), setting.range.text);
+        fault(setting.name, detail::formatReal(value), setting.range.allowed(value));
       }
     } else if constexpr (std::is_enum_v<T>) {
       if (static_cast<std::size_t>(value) >= EnumNames<T>::values.size()) {

@@ -46,7 +46,7 @@ std::size_t Space<Scalar, Layout>::checkedIndex(std::size_t i) const {
 
 template <Real Scalar, class Layout>
 BodyId Space<Scalar, Layout>::addBody(const Body<Scalar>& body) {
-  contact_.materials.check(static_cast<std::uint32_t>(body.material), "the body or plane");
+  contact_.materials.check(static_cast<std::uint32_t>(body.material), "the new body");
   const BodyId id = bodies_.add(body);
   forcesValid_ = false;
   if (ledgerOpen_) {
@@ -77,7 +77,7 @@ void Space<Scalar, Layout>::reorderBodies() {
 
 template <Real Scalar, class Layout>
 std::size_t Space<Scalar, Layout>::addPlane(const Vector& normal, Scalar offset, MaterialId material) {
-  contact_.materials.check(static_cast<std::uint32_t>(material), "the body or plane");
+  contact_.materials.check(static_cast<std::uint32_t>(material), "the new plane");
   wakeAll();
   return contact_.boundaries.add(makePlane(normal, offset, material));
 }
@@ -85,7 +85,7 @@ std::size_t Space<Scalar, Layout>::addPlane(const Vector& normal, Scalar offset,
 template <Real Scalar, class Layout>
 std::vector<std::size_t> Space<Scalar, Layout>::addBox(const Vector& low, const Vector& high,
                                                        MaterialId material, BoxFaces open) {
-  contact_.materials.check(static_cast<std::uint32_t>(material), "the body or plane");
+  contact_.materials.check(static_cast<std::uint32_t>(material), "the new box");
   wakeAll();
   std::vector<std::size_t> numbers;
   for (const Plane<Scalar>& face : makeBox(low, high, material, open)) {
