@@ -1,9 +1,10 @@
 # cmake -DFROM=<way> -DGRAVEL_SOURCE=<folder> -DGRAVEL_BUILD=<folder> -DWORK=<folder> -DGENERATOR=<name>
 #       -DCOMPILER=<c++> -DMAKE_PROGRAM=<path> -DPKG_CONFIG=<path> -DEIGEN_DIR=<folder> -DNANOFLANN_DIR=<folder>
-#       -P check_consumer.cmake
+#       -DSPACE=<object file> -P check_consumer.cmake
 #
 # Builds and runs tests/consumer against gravel taken in one way: find_package, pkg-config (both from an installation
-# that was moved after it was made), add_subdirectory or FetchContent.
+# that was moved after it was made), add_subdirectory or FetchContent. With find_package the program compiles all that
+# it uses; in the other ways it takes the code of Space<double> from SPACE, which would take half a minute each.
 cmake_minimum_required(VERSION 3.25)
 
 file(REMOVE_RECURSE "${WORK}")
@@ -39,16 +40,20 @@ if(FROM STREQUAL "pkg-config")
     endif()
   endforeach()
   execute_process(
-    COMMAND "${COMPILER}" -std=c++20 "${consumer}/main.cpp" "${consumer}/other.cpp" ${flags} -o "${WORK}/consumer"
+    COMMAND "${COMPILER}" -std=c++20 -include "${GRAVEL_SOURCE}/tests/support/space.hpp"
+      "${consumer}/main.cpp" "${consumer}/other.cpp" "${SPACE}" ${flags} -o "${WORK}/consumer"
     COMMAND_ERROR_IS_FATAL ANY)
   execute_process(COMMAND "${WORK}/consumer" COMMAND_ERROR_IS_FATAL ANY)
   return()
 endif()
 
+if(FROM STREQUAL "find_package")
+  set(SPACE "")
+endif()
 execute_process(
   COMMAND "${CMAKE_COMMAND}" -S "${consumer}" -B "${WORK}/build" -G "${GENERATOR}"
     "-DCMAKE_MAKE_PROGRAM=${MAKE_PROGRAM}" "-DCMAKE_CXX_COMPILER=${COMPILER}" "-DCMAKE_PREFIX_PATH=${WORK}/moved"
-    "-DGRAVEL_FROM=${FROM}" "-DGRAVEL_SOURCE=${GRAVEL_SOURCE}"
+    "-DGRAVEL_FROM=${FROM}" "-DGRAVEL_SOURCE=${GRAVEL_SOURCE}" "-DSPACE=${SPACE}"
     "-DEigen3_DIR=${EIGEN_DIR}" "-Dnanoflann_DIR=${NANOFLANN_DIR}"
   OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
 execute_process(COMMAND "${CMAKE_COMMAND}" --build "${WORK}/build" COMMAND_ERROR_IS_FATAL ANY)
