@@ -1,6 +1,6 @@
 # cmake -DFROM=<way> -DGRAVEL_SOURCE=<folder> -DGRAVEL_BUILD=<folder> -DWORK=<folder> -DGENERATOR=<name>
 #       -DCOMPILER=<c++> -DMAKE_PROGRAM=<path> -DPKG_CONFIG=<path> -DEIGEN_DIR=<folder> -DNANOFLANN_DIR=<folder>
-#       -DSPACE=<object file> -P check_consumer.cmake
+#       -DSPACE=<object file> -DFLAGS=<options it was compiled with> -P check_consumer.cmake
 #
 # Builds and runs tests/consumer against gravel taken in one way: find_package, pkg-config (both from an installation
 # that was moved after it was made), add_subdirectory or FetchContent. With find_package the program compiles all that
@@ -33,6 +33,7 @@ if(FROM STREQUAL "pkg-config")
   execute_process(COMMAND "${PKG_CONFIG}" --cflags --libs gravel
     OUTPUT_VARIABLE flags OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
   separate_arguments(flags UNIX_COMMAND "${flags}")
+  separate_arguments(options UNIX_COMMAND "${FLAGS}")
   # Include paths and OpenMP, nothing else.
   foreach(flag IN LISTS flags)
     if(NOT flag MATCHES "^(-I.*|-fopenmp)$")
@@ -40,7 +41,7 @@ if(FROM STREQUAL "pkg-config")
     endif()
   endforeach()
   execute_process(
-    COMMAND "${COMPILER}" -std=c++20 -include "${GRAVEL_SOURCE}/tests/support/space.hpp"
+    COMMAND "${COMPILER}" -std=c++20 ${options} -include "${GRAVEL_SOURCE}/tests/support/space.hpp"
       "${consumer}/main.cpp" "${consumer}/other.cpp" "${SPACE}" ${flags} -o "${WORK}/consumer"
     COMMAND_ERROR_IS_FATAL ANY)
   execute_process(COMMAND "${WORK}/consumer" COMMAND_ERROR_IS_FATAL ANY)
@@ -54,6 +55,7 @@ execute_process(
   COMMAND "${CMAKE_COMMAND}" -S "${consumer}" -B "${WORK}/build" -G "${GENERATOR}"
     "-DCMAKE_MAKE_PROGRAM=${MAKE_PROGRAM}" "-DCMAKE_CXX_COMPILER=${COMPILER}" "-DCMAKE_PREFIX_PATH=${WORK}/moved"
     "-DGRAVEL_FROM=${FROM}" "-DGRAVEL_SOURCE=${GRAVEL_SOURCE}" "-DSPACE=${SPACE}"
+    "-DCMAKE_CXX_FLAGS=${FLAGS}"
     "-DEigen3_DIR=${EIGEN_DIR}" "-Dnanoflann_DIR=${NANOFLANN_DIR}"
   OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
 execute_process(COMMAND "${CMAKE_COMMAND}" --build "${WORK}/build" COMMAND_ERROR_IS_FATAL ANY)
