@@ -326,6 +326,30 @@ TEST_CASE("Sleep and waking are the same bits for any number of threads and thro
   }
 }
 
+// Who looks for what comes near to sleepers may search for neighbours; bodies near boundaries are to be
+// looked for again then, too. They were not, and the ball fell through the floor.
+TEST_CASE("A ball that falls far beside sleepers lands on the floor, and bounces as without them") {
+  for (const double height : {2.0, 5.0, 11.0}) {
+    std::vector<double> heights[2];
+    for (const bool sleeps : {false, true}) {
+      Space<double> space(sleepy(sleeps ? 1e-2 : 0));
+      space.setUniformField({0, 0, -g});
+      space.addPlane({0, 0, 1}, 0.0);
+      space.addBody(ball({0, 0, 0.5}, {0, 0, 0}, 0.5, 2.0));
+      const BodyId falling = space.addBody(ball({30, 0, height}, {0, 0, 0}, 0.5, 2.0));
+      for (std::size_t k = 0; k < 200; ++k) {
+        space.computeDynamics(k);
+        heights[sleeps ? 1 : 0].push_back(Vec(space.body(falling).position())[2]);
+        if (k == 60) {
+          CHECK(sleepers(space) == (sleeps ? 1 : 0));
+        }
+      }
+    }
+    CHECK(*std::min_element(heights[1].begin(), heights[1].end()) > 0.5 - 1e-3);
+    CHECK(heights[0] == heights[1]);
+  }
+}
+
 TEST_CASE("Sleep is refused where nothing rests or touches") {
   for (const IntegratorKind kind :
        {IntegratorKind::SymplecticEpicycle, IntegratorKind::GaussRadau15, IntegratorKind::Hermite4}) {

@@ -285,6 +285,7 @@ class ContactStage {
   std::vector<HalfSpace<Scalar>> walls_;
   NeighbourList<Scalar> neighbours_;
   BoundaryList<Scalar> nearWalls_;
+  std::uint64_t searchesForWalls_ = 0;  // of neighbours_, when nearWalls_ were last asked for
   NarrowPhase<Scalar> narrow_;
   ImpactEvents<Scalar> impacts_;
   std::vector<ContactName> names_;

@@ -184,8 +184,10 @@ std::optional<std::span<const std::uint32_t>> ContactStage<Scalar, Layout>::near
   if (!domain.isOpen() || neighbours_.strays()) {
     return std::nullopt;
   }
-  return nearWalls_.update(bodies.positions(), detail::RestingReaches<Bodies>{bodies}, walls_,
-                           neighbours_.rebuilt(), neighbours_.skin(), Scalar(0), h);
+  // Who looks for neighbours may not look for boundaries: whether the last update searched is not enough.
+  const bool stale = std::exchange(searchesForWalls_, neighbours_.searches()) != neighbours_.searches();
+  return nearWalls_.update(bodies.positions(), detail::RestingReaches<Bodies>{bodies}, walls_, stale,
+                           neighbours_.skin(), Scalar(0), h);
 }
 
 template <Real Scalar, class Layout>

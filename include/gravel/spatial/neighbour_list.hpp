@@ -94,6 +94,8 @@ class NeighbourList {
 
   /// Whether the last update searched.
   bool rebuilt() const { return rebuilt_; }
+  /// Searches made so far.
+  std::uint64_t searches() const { return searches_; }
 
   /// Why the last update searched, or why it did not.
   const char* reason() const {
@@ -218,6 +220,7 @@ class NeighbourList {
     const std::size_t n = positions.size();
     const bool motionSeen = built_ && revision == revision_ && n == places_.size() && isFinite(moved_sq_);
     ++version_;
+    ++searches_;
     built_ = false;  // stays so if the search throws
     places_.resize(n);
     radii_.resize(n);
@@ -302,6 +305,7 @@ class NeighbourList {
   std::uint64_t revision_ = 0;
   std::uint64_t updates_ = 0;  ///< since the last search
   std::uint64_t version_ = 0;
+  std::uint64_t searches_ = 0;
   const char* reason_ = nullptr;
   bool strays_ = false;
   bool built_ = false;
