@@ -62,10 +62,11 @@ class ContactProblem : public detail::ProblemBodies<S> {
   /// \param goesOn the contacts of the last problem, where they were, and `last` is its solution: the guess
   ///        does to velocities what that did, `ratio` times, so that no contact needs to be asked; bodies
   ///        whose masses have changed are guarded against
+  /// \param drifts bodies go on straight for dt: see TurningPair
   template <ContactBodies B>
   void gather(const ContactView<S>& contacts, const B& source, const ContactColoring& colouring, const S& dt,
               const ContactSettings<S>& settings, const ContactKinds& kinds, detail::ImpulseList<S>& impulses,
-              const detail::ImpulseList<S>& last, const S& ratio, bool fresh, bool goesOn);
+              const detail::ImpulseList<S>& last, const S& ratio, bool fresh, bool goesOn, bool drifts);
 
   /// Calls f(group) for rows [begin, end), which share no movable body; brings what later ones need nearer.
   template <class F>
@@ -182,6 +183,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
     const S& dt;
     const ContactSettings<S>& settings;
     bool fresh;
+    bool drifts;
   };
 
   /// The largest change that a contact asks for, the largest that a sweep would make, squared, and for how
@@ -197,8 +199,8 @@ class ContactProblem : public detail::ProblemBodies<S> {
       return *this;
     }
   };
-  /// Whether what a row asks for left its restitution out of account, and whether it did so as one that
-  /// carried a load before.
+  /// Whether what a row asks for left its restitution and its turn out of account, and whether it did so as
+  /// one that carried a load before.
   enum class RowRest : std::uint8_t { Not, Free, Loaded };
 
   /// Takes up those rows but the lone ones of which `wanted(k, most)`, without a guess: their bodies have it.
@@ -264,6 +266,17 @@ class ContactProblem : public detail::ProblemBodies<S> {
   [[gnu::always_inline]] inline S aim(const Taking<B>& taking, const Group& group, Lanes& row,
                                       const detail::BodyLanes<S>& b1, const detail::BodyLanes<S>& b2);
 
+  /// Drifts of second sides.
+  template <class B>
+  [[gnu::always_inline]] inline detail::PackedVector<S> driftsOf(const Taking<B>& taking,
+                                                                 const Group& group) const;
+
+  /// \param b1,b2 as in aim() \param v relative velocity, with drifts
+  template <class B>
+  [[gnu::always_inline]] inline detail::TurningPair<S> turningOf(
+      const Taking<B>& taking, const Group& group, const Lanes& row, const detail::BodyLanes<S>& b1,
+      const detail::BodyLanes<S>& b2, const detail::PackedVector<S>& v, const Pack& v_n) const;
+
   /// Target of a row that may be faster than what rests.
   template <class B>
   S rebound(const Taking<B>& taking, const Group& group, std::size_t lane, const Vector3<S>& n, const S& v_n,
@@ -276,7 +289,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
 
   template <class B>
   void aimSlip(const Taking<B>& taking, const Group& group, std::size_t lane, const Lanes& rowLanes,
-               const S& drift_n);
+               const S& drift_n, const Vector3<S>& turned);
 
   /// Begins with the first guess of rows whose bodies have it already.
   [[gnu::always_inline]] inline void repeat(const Group& group, Lanes& row);

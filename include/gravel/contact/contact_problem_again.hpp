@@ -6,7 +6,7 @@
 ///
 /// A row that is right stays so while its bodies begin where they began and their impulses stay: how far both
 /// may have moved since is half of what ended the sweeps, and counts the change of where they begin. What a
-/// row asks for must not depend on how fast it is approached, so that those with restitution are looked at,
+/// row asks for must not depend on velocities, so that those with restitution are looked at, those that turn,
 /// and those whose load has gone.
 
 #include <gravel/contact/contact_problem.hpp>

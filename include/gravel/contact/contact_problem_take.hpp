@@ -14,7 +14,7 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
                                const ContactColoring& colouring, const S& dt,
                                const ContactSettings<S>& settings, const ContactKinds& kinds,
                                detail::ImpulseList<S>& impulses, const detail::ImpulseList<S>& last,
-                               const S& ratio, bool fresh, bool goesOn) {
+                               const S& ratio, bool fresh, bool goesOn, bool drifts) {
   friction = kinds.rub || kinds.turn;
   drifting = kinds.drift;
   again = goesOn;
@@ -28,13 +28,14 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   detail::resizeSparingly(marks, contacts.size());
   detail::resizeSparingly(gaps_, contacts.size());
   detail::resizeSparingly(turning, kinds.turn ? contacts.size() : 0);
-  slipTargets.assign(friction && (kinds.drift || kinds.spring) ? rows.size() : 0, Vector3<S>::Zero());
+  const bool slips = friction && (kinds.drift || kinds.spring || (drifts && this->turns_));
+  slipTargets.assign(slips ? rows.size() : 0, Vector3<S>::Zero());
   detail::resizeSparingly(rests_, contacts.size());
   detail::resizeSparingly(approaches_, contacts.size());
-  passes = again && watch.holds() && sameScales_ && ratio == S(1) && turning.empty() && slipTargets.empty() &&
+  passes = again && watch.holds() && sameScales_ && ratio == S(1) && turning.empty() && !kinds.spring &&
            !drifting && !this->isScaled() && settings.restitutionThreshold == threshold_;
   threshold_ = settings.restitutionThreshold;
-  const Taking<B> taking{contacts, source, colouring, dt, settings, fresh};
+  const Taking<B> taking{contacts, source, colouring, dt, settings, fresh, drifts};
   Most most = detail::sumOverParts(
       0, colouring.loneCount(), Most{}, [&](std::size_t begin, std::size_t end, Most& part) {
         forGroups(colouring, begin, end, [&](const Group& group) { put(group, take(taking, group, part)); });
@@ -162,14 +163,17 @@ inline S ContactProblem<S>::aim(const Taking<B>& taking, const Group& group, Lan
   const Pack gap = Pack::of([&](std::size_t lane) { return gaps_[group.row[lane]]; });
   // The radii as the arms have them.
   const Pack radii = row.c1 * b1.spin + row.c2 * b2.spin - gap;
-  const Pack allowed = speedIn(detail::RestingGap<S>::allowedApproach(gap, radii, falls, taking.dt));
-  const Pack present = row.n.dot(b2.v - b1.v);
-  Pack drift = zero;
-  if (drifting) {
-    drift = Pack::of([&](std::size_t lane) { return S(driftOf(taking, group, lane).dot(row.n.at(lane))); });
-  }
+  Pack allowed = speedIn(detail::RestingGap<S>::allowedApproach(gap, radii, falls, taking.dt));
+  const detail::PackedVector<S> v_rel = b2.v - b1.v;
+  const Pack present = row.n.dot(v_rel);
+  const detail::PackedVector<S> drifts = driftsOf(taking, group);
+  const Pack drift = row.n.dot(drifts);
   const Pack v_n = present + drift;
   const Pack speed = sizeOf(v_n);
+  const detail::TurningPair<S> turned = turningOf(taking, group, row, b1, b2, v_rel + drifts, v_n);
+  if (taking.drifts) {
+    allowed = allowed + turned.approach;
+  }
   // In a heap at rest relative accelerations vanish, and what a step brings is passed on by the others:
   // there no more than a fall of the step is rest.
   const Pack load = Pack::of([&](std::size_t lane) { return S(last_->normal(group.row[lane])); });
@@ -180,7 +184,7 @@ inline S ContactProblem<S>::aim(const Taking<B>& taking, const Group& group, Lan
   for (std::size_t lane = 0; lane < group.count; ++lane) {
     const std::uint32_t k = group.row[lane];
     marks[k] = {.taken = true};
-    rests_[k] = load[lane] > S(0) ? RowRest::Loaded : RowRest::Free;
+    rests_[k] = turned.counts[lane] ? RowRest::Not : load[lane] > S(0) ? RowRest::Loaded : RowRest::Free;
     if (!turning.empty()) {
       turning[k].l = turning[k].step = Vector3<S>::Zero();
     }
@@ -194,7 +198,8 @@ inline S ContactProblem<S>::aim(const Taking<B>& taking, const Group& group, Lan
     });
   }
   for (std::size_t lane = 0; lane < group.count && !slipTargets.empty(); ++lane) {
-    aimSlip(taking, group, lane, row, drift[lane]);
+    aimSlip(taking, group, lane, row, drift[lane],
+            taking.drifts ? turned.slip.at(lane) : Vector3<S>(Vector3<S>::Zero()));
   }
   const Pack approach = row.target - present;
   S most(0);
@@ -203,6 +208,34 @@ inline S ContactProblem<S>::aim(const Taking<B>& taking, const Group& group, Lan
     most = std::max<S>(most, approach[lane]);
   }
   return most;
+}
+
+template <Real S>
+template <class B>
+inline auto ContactProblem<S>::driftsOf(const Taking<B>& taking, const Group& group) const
+    -> detail::PackedVector<S> {
+  if (!drifting) {
+    return detail::PackedVector<S>::zero();
+  }
+  const auto part = [&](Eigen::Index c) {
+    return Pack::of([&](std::size_t lane) { return S(driftOf(taking, group, lane)[c]); });
+  };
+  return {part(0), part(1), part(2)};
+}
+
+template <Real S>
+template <class B>
+inline auto ContactProblem<S>::turningOf(const Taking<B>& taking, const Group& group, const Lanes& row,
+                                         const detail::BodyLanes<S>& b1, const detail::BodyLanes<S>& b2,
+                                         const detail::PackedVector<S>& v, const Pack& v_n) const
+    -> detail::TurningPair<S> {
+  const Pack boundary = Pack::of(
+      [&](std::size_t lane) { return S(group.slot2[lane] == taking.colouring.staticSlot() ? 1 : 0); });
+  const detail::PackedVector<S> w =
+      friction ? row.c1 * b1.s + row.c2 * b2.s : detail::PackedVector<S>::zero();
+  return detail::TurningPair<S>::of(!(boundary > Pack::zero()), row.n, row.c1 * b1.spin + row.c2 * b2.spin,
+                                    largerOf(v.squaredNorm() - v_n * v_n, Pack::zero()), w,
+                                    b1.inverseMass + b2.inverseMass, taking.dt, speedExponent_);
 }
 
 template <Real S>
@@ -235,14 +268,14 @@ S ContactProblem<S>::rebound(const Taking<B>& taking, const Group& group, std::s
 template <Real S>
 template <class B>
 void ContactProblem<S>::aimSlip(const Taking<B>& taking, const Group& group, std::size_t lane,
-                                const Lanes& rowLanes, const S& drift_n) {
+                                const Lanes& rowLanes, const S& drift_n, const Vector3<S>& turned) {
   const std::uint32_t k = group.row[lane];
   Row row;
   row.n = rowLanes.n.at(lane);
   row.c1 = rowLanes.c1[lane];
   row.c2 = rowLanes.c2[lane];
   Vector3<S>& slipTarget = slipTargets[k];
-  slipTarget = drift_n * row.n;
+  slipTarget = turned + drift_n * row.n;
   slipTarget -= drifting ? driftOf(taking, group, lane) : Vector3<S>(Vector3<S>::Zero());
   const Contact<S>& c = contactOf(taking, group, lane);
   const S restored = marks[k].impact ? taking.contacts.material(c).tangentialRestitution : S(0);

@@ -6,6 +6,7 @@
 #include <gravel/contact/contact_coloring.hpp>
 #include <gravel/contact/row_watch.hpp>
 #include <gravel/contact/solver_rows.hpp>
+#include <gravel/contact/turning_pair.hpp>
 #include <gravel/core/packed.hpp>
 #include <gravel/core/parallel.hpp>
 
@@ -82,6 +83,12 @@ class ProblemBodies {
       for (std::size_t slot = begin; slot < end; ++slot) {
         Body now = take(source, colouring, slot);
         part += {std::max<S>(maxAbs(now.v), maxAbs(now.s)), S(0), now.inverseMass, now.inverseMass};
+        if (now.inverseMass > S(0)) {
+          part.leastFall = std::min<S>(part.leastFall, initial[slot].fall);
+        }
+        if (initial[slot].radius > S(0)) {
+          part.mostTurn = std::max<S>(part.mostTurn, S(now.s.squaredNorm() / initial[slot].radius));
+        }
         Body weighed = now;
         weigh(weighed);
         auto& start = initial[slot];
@@ -110,6 +117,7 @@ class ProblemBodies {
       }
       return part;
     });
+    turns_ = scales.mostTurn > turningShare<S>() * scales.leastFall;
     const bool wasAgain = again;
     const S tooMuch = S(1) / Eigen::NumTraits<S>::epsilon();
     again = again && scales.others == 0 &&
@@ -193,6 +201,7 @@ class ProblemBodies {
   int speedExponent_ = 0;
   int massExponent_ = 0;
   bool sameScales_ = false;  ///< as in the last problem
+  bool turns_ = false;       ///< spins may count in TurningPair
   /// Above that an impulse of the last problem would leave nothing but its rounding: speeds have fallen.
   S mostGuess_ = S(0);
 };

@@ -68,8 +68,8 @@ struct SolvedProblem {
   S threshold = S(0);
 };
 
-/// The largest speed, the largest change of one that is to be done again, the masses > 0, and how many are
-/// not what they were.
+/// The largest speed, the largest change of one that is to be done again, the masses > 0, how many are not
+/// what they were, and of those that move the least fall [m s^-2] and the largest s^2/r [m s^-2].
 template <Real S>
 struct ProblemScales {
   S fastest = S(0);
@@ -77,7 +77,11 @@ struct ProblemScales {
   S lightest = S(0);
   S heaviest = S(0);
   std::size_t others = 0;
+  S leastFall = Eigen::NumTraits<S>::highest();
+  S mostTurn = S(0);
   ProblemScales& operator+=(const ProblemScales& other) {
+    leastFall = std::min<S>(leastFall, other.leastFall);
+    mostTurn = std::max<S>(mostTurn, other.mostTurn);
     others += other.others;
     fastest = std::max<S>(fastest, other.fastest);
     change = std::max<S>(change, other.change);

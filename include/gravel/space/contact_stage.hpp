@@ -125,8 +125,8 @@ class ContactStage {
   }
 
   /// Solves all contacts together on the present velocities. Adds to the report of the step.
-  /// \param h [s] length of the step
-  void solve(Bodies& bodies, const Config& config, const Scalar& h, Profiler& profiler) {
+  /// \param h [s] length of the step \param drifts  the drift of the step follows
+  void solve(Bodies& bodies, const Config& config, const Scalar& h, bool drifts, Profiler& profiler) {
     if (contacts_.empty()) {
       profiler.skip(Phase::ContactSolve, "no contacts");
       solver_.begin(contacts_, bodies);
@@ -144,7 +144,7 @@ class ContactStage {
     settings.accelerate = !solver_.hasFriction();
     solver_.setSettings(settings);
     solver_.rebind(contacts_);  // the space may be a copy
-    const ContactReport<Scalar> half = solver_.solve(bodies, h);
+    const ContactReport<Scalar> half = solver_.solve(bodies, h, drifts);
     acted_ = half.iterations > 0;
     if (!acted_) {
       solver_.forget();  // its impulses are those of the solve before

@@ -222,7 +222,7 @@ class Space : public Settings<Scalar> {
   Scalar getEffectiveMass(const CollisionContext& ctx, const Vector& direction) const;
   void logSystemEnergy(std::size_t iteration);
   void buildCollisionGraph();
-  void resolveCollisions();
+  void resolveCollisions(bool drifts = false);
   void applyGravity();
   void updateAdaptiveTimeStep();
   void applyDamping();

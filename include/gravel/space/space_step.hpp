@@ -13,10 +13,11 @@
 ///   3. forces at those positions, last kick;
 ///   4. contacts are solved together on the velocities of the step's end, with restitution;
 ///   5. damping; 6. time passes, next step size; 7. diagnostics.
-/// So contact forces take part in both halves of the step as all forces do in velocity Verlet (the velocity
-/// projections of RATTLE, Andersen 1983, J. Comput. Phys. 52, 24, for inequality constraints): resting,
-/// rolling and sliding are of second order in h, and a body at rest has velocity zero. A single solve at the
-/// end of the step lets piles sink by g h^2/2 and be lifted again every step, which spins a rolling pile up.
+/// So contact forces take part in both halves of the step as all forces do in velocity Verlet (both
+/// constraints of RATTLE, Andersen 1983, J. Comput. Phys. 52, 24, as inequalities; contact/turning_pair.hpp
+/// for the first one): resting, rolling and sliding are of second order in h, and a body at rest has velocity
+/// zero. A single solve at the end of the step lets piles sink by g h^2/2 and be lifted again every step,
+/// which spins a rolling pile up.
 
 #include <gravel/space/space.hpp>
 #include <gravel/space/space_points.hpp>
@@ -170,8 +171,8 @@ void Space<Scalar, Layout>::buildCollisionGraph() {
 }
 
 template <Real Scalar, class Layout>
-void Space<Scalar, Layout>::resolveCollisions() {
-  contact_.solve(bodies_, this->config_, contact_dt_, profiler_);
+void Space<Scalar, Layout>::resolveCollisions(bool drifts) {
+  contact_.solve(bodies_, this->config_, contact_dt_, drifts, profiler_);
 }
 
 template <Real Scalar, class Layout>

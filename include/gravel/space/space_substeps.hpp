@@ -45,7 +45,7 @@ struct Space<Scalar, Layout>::Departure {
   void operator()(const Scalar& kick) const {
     if (!space->contacts().empty()) {
       space->contact_.drivePlanes(middle);
-      space->resolveCollisions();
+      space->resolveCollisions(true);
       space->contact_.endFirstHalf(space->force_, space->bodies_, kick);
     }
     space->contact_.strike(space->bodies_, space->config_, HillFrame<Scalar>(space->contact_.domain),
