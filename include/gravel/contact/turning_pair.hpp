@@ -42,15 +42,20 @@ struct TurningPair {
     const P zero = P::zero();
     const P one = P::all(S(1));
     const P rate = scaledLanes(P::all(h) * reciprocalOf(distance), -exponent);
-    const P angle_sq = scaledLanes(v_t_sq * rate, -exponent) * P::all(h) * reciprocalOf(distance);
+    const auto angleSquared = [&](const P& speed_sq) {
+      return scaledLanes(speed_sq * rate, -exponent) * P::all(h) * reciprocalOf(distance);
+    };
     // Past each other by a quarter of the distance and more nothing is held: a blow on the way would leave
-    // them in each other.
-    const auto turns = pair & (angle_sq < P::all(S(1) / S(16)));
+    // them in each other. Nor has a spin by more than that one axis on the way.
+    const P most = P::all(S(1) / S(16));
+    const P angle_sq = angleSquared(v_t_sq);
+    const auto turns = pair & (angle_sq < most);
+    const auto rolls = turns & (angleSquared(w.squaredNorm()) < most);
     TurningPair turning;
     turning.approach =
         choose(turns, v_t_sq * rate / (one + squareRoot(choose(turns, one - angle_sq, one))), zero);
     const P w_n = w.dot(n);
-    turning.slip = choose(turns, P::all(S(1) / S(2)) * rate * w_n * (w - w_n * n), V::zero());
+    turning.slip = choose(rolls, P::all(S(1) / S(2)) * rate * w_n * (w - w_n * n), V::zero());
     const P little = P::all(S(turningShare<S>() / S(2)) * h) * scaledLanes(falls, exponent);
     turning.counts = (turning.approach > little) | (turning.slip.sumAbs() > little);
     return turning;
