@@ -26,6 +26,20 @@ Space<double> onPlane(double slope, double mu, double rolling, double spinning, 
 
 }  // namespace
 
+// R* = r1 r2/(r1 + r2) is zero beside a point: it resists no rolling. It was taken for a wall, which does.
+TEST_CASE("Beside a point nothing resists rolling, and angular momentum is kept") {
+  SimulationConfig<double> config = plain(0.01);
+  config.rollingFriction = 0.05;
+  config.positionalCorrectionFactor = 0;
+  Space<double> space(config);
+  space.addBody(ball({0, 0.4, 0}, {0, -0.02, 0}, 0.5, 1, {0, 0, 1}));
+  space.addBody(ball({0, 0, 0}, {0, 0, 0}, 0, 1));
+  const Vec before = space.conserved().angularMomentum;
+  advance(space, 3);
+  CHECK((Vec(space.conserved().angularMomentum) - before).norm() < 1e-16);
+  CHECK(Vec(space.body(0).angularVelocity()) == Vec(0, 0, 1));
+}
+
 TEST_CASE("On an incline a sphere stays while the tangent is below the rolling coefficient, else rolls") {
   const double mu_r = 0.1;
   for (const double part : {0.5, 0.98, 1.02, 2.0}) {

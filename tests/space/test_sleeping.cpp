@@ -350,6 +350,50 @@ TEST_CASE("A ball that falls far beside sleepers lands on the floor, and bounces
   }
 }
 
+TEST_CASE("What comes, or changes, while everything sleeps is looked for at once") {
+  // Without a field nothing falls: only who looks finds the ball that reaches into the floor.
+  SimulationConfig<double> config = sleepy();
+  config.positionalCorrectionFactor = 0.5;
+  Space<double> still(config);
+  still.addPlane({0, 0, 1}, 0.0);
+  still.addBody(ball({0, 0, 0.5}, {0, 0, 0}, 0.5));
+  advance(still, 60);
+  REQUIRE(sleepers(still) == 1);
+  const BodyId deep = still.addBody(ball({5, 0, 0.4}, {0, 0, 0}, 0.5));
+  advance(still, 1);
+  CHECK_THAT(Vec(still.body(deep).position())[2], WithinAbs(0.45, 1e-12));
+
+  // A heap whose field is turned wakes with its contacts, as from a file.
+  Space<double> space(sleepy());
+  space.setUniformField({0, 0, -g});
+  space.addPlane({0, 0, 1}, 0.0);
+  space.addBody(ball({0, 0, 0.5}, {0, 0, 0}, 0.5));
+  space.addBody(ball({0, 0, 1.5}, {0, 0, 0}, 0.5));
+  advance(space, 60);
+  REQUIRE(sleepers(space) == 2);
+  space.setUniformField({1, 0, -g});
+  const TemporaryFile file("turned");
+  space.save(file.path());
+  Space<double> again;
+  again.restore(file.path());
+  for (std::size_t k = 0; k < 5; ++k) {
+    space.computeDynamics(k);
+    again.computeDynamics(k);
+    CHECK(space.contacts().size() == 2);
+    CHECK(sameBits(stateOf(space), stateOf(again)));
+  }
+}
+
+TEST_CASE("A plane or a box that is refused wakes nobody") {
+  Space<double> space = asleep();
+  const std::size_t before = sleepers(space);
+  REQUIRE(before > 0);
+  CHECK_THROWS_AS(space.addPlane({0, 0, 0}, 0), std::invalid_argument);
+  CHECK_THROWS_AS(space.addBox({1, 1, 1}, {0, 0, 0}), std::invalid_argument);
+  advance(space, 1);
+  CHECK(sleepers(space) == before);
+}
+
 TEST_CASE("Sleep is refused where nothing rests or touches") {
   for (const IntegratorKind kind :
        {IntegratorKind::SymplecticEpicycle, IntegratorKind::GaussRadau15, IntegratorKind::Hermite4}) {

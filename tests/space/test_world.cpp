@@ -1,3 +1,4 @@
+#include "laws/laws.hpp"
 #include "space/quiet_spaces.hpp"
 #include "support/catch.hpp"
 #include "support/space.hpp"
@@ -204,6 +205,56 @@ TEST_CASE("In a periodic box bodies leave through one side and come in at the ot
   alone.addBody(at({0, 0, 0}, {10, 0, 0}));
   advance(alone, 300);
   CHECK_THAT(std::abs(alone.body(0).position()[0]), WithinAbs(0.0, 1e-10));
+}
+
+TEST_CASE(
+    "What falls through a periodic box gets the work of the field from outside, and the ledger closes") {
+  for (const bool sheared : {false, true}) {
+    SimulationConfig<double> config = plain(0.01);
+    config.integrator = sheared ? IntegratorKind::SymplecticEpicycle : IntegratorKind::VelocityVerlet;
+    Space<double> space(config);
+    space.setDomain(sheared ? Domain<double>::shearPeriodic({10, 10, 10}, 0.1, 0)
+                            : Domain<double>::periodic({10, 10, 10}));
+    space.setUniformField({0, 0, -1});
+    space.addBody(ball({0, 0, 0}, {0, 0, 0}, 0.5, 2.0));
+    const double before = space.energyLedger().total();
+    advance(space, 700);  // 24.5 m: through the box twice, 2 kg x 1 m s^-2 x 10 m each time
+    CHECK(std::abs(space.energyLedger().total() - before) < 1e-10);
+    CHECK_THAT(space.energyLedger().work, WithinRel(-40.0, 1e-12));
+  }
+}
+
+TEST_CASE("A force on a tracer and a torque on a point do no work: nothing feels them") {
+  for (const bool point : {false, true}) {
+    Space<double> space(plain(0.01));
+    space.addBody(ball({1, 0, 0}, {1, 0, 0}, 0, point ? 1.0 : 0.0, {0, 0, 1}));
+    space.setForceHook([=](Bodies<double, SoA>& bodies, double) {
+      if (point) {
+        bodies[0].torque() += Vec(0, 0, 1);
+      } else {
+        bodies[0].force() -= 4 * Vec(bodies[0].position());
+      }
+    });
+    advance(space, 20);
+    CHECK(space.energyLedger().work == 0);
+  }
+}
+
+TEST_CASE("Another mass of a fixed body is felt at once, in any unit") {
+  for (const double unit : {1.0, 1e-20, 1e20}) {
+    SimulationConfig<double> config = plain(1e-3);
+    config.G = 1 / unit;
+    Space<double> space(config);
+    Body<double> sun = ball({0, 0, 0}, {0, 0, 0}, 0, unit);
+    sun.fixed = true;
+    const BodyId centre = space.addBody(sun);
+    const BodyId planet = space.addBody(ball({1, 0, 0}, {0, 0, 0}, 0, 1e-3 * unit));
+    advance(space, 1);
+    space.body(centre).mass() *= 2;
+    advance(space, 1);
+    // Half a step with the old mass, half of one with the new one at either end of the next.
+    CHECK_THAT(Vec(space.body(planet).velocity())[0], WithinRel(-3e-3, 1e-5));
+  }
 }
 
 TEST_CASE("Gravity and a periodic box go together, in either order; a sheared one needs its integrator") {

@@ -110,8 +110,8 @@ inline auto ContactProblem<S>::take(const Taking<B>& taking, const Group& group,
   for (std::size_t lane = 0; lane < group.count && taking.fresh && !turning.empty(); ++lane) {
     const Material<S>& material = taking.contacts.material(contactOf(taking, group, lane));
     turning[group.row[lane]] =
-        detail::turningRow<S>(material, b1.spin[lane], b2.spin[lane], bodies[group.slot1[lane]].spin,
-                              bodies[group.slot2[lane]].spin);
+        detail::turningRow<S>(material, group.slot2[lane] == taking.colouring.staticSlot(), b1.spin[lane],
+                              b2.spin[lane], bodies[group.slot1[lane]].spin, bodies[group.slot2[lane]].spin);
   }
   most += Most{aim(taking, group, row, b1, b2)};
   return row;

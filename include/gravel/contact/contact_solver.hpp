@@ -117,7 +117,7 @@ class ContactSolver {
                             algorithm_);
         kept_ = problem_.kept;
         if (kept_) {
-          problem_.keepLast(coloring_, before_.impulses());
+          problem_.keepLast(coloring_, last == &guess_ ? guess_ : before_.impulses());
         }
         energy_.settle(problem_, coloring_, contacts, otherRows_, report);
         otherRows_ = false;

@@ -137,13 +137,13 @@ S reciprocal(const S& x) {
   return x > S(0) ? S(1) / x : S(0);
 }
 
-/// \param r2 0 for a boundary
+/// \param boundary in place of the second: flat, where a point would be sharp
 template <Real S>
-TurningRow<S> turningRow(const Material<S>& material, const S& r1, const S& r2, const S& spin1,
+TurningRow<S> turningRow(const Material<S>& material, bool boundary, const S& r1, const S& r2, const S& spin1,
                          const S& spin2) {
   TurningRow<S> row;
-  row.q1 = r2 > S(0) ? S(r2 / (r1 + r2)) : S(1);
-  row.q2 = r2 > S(0) ? S(r1 / (r1 + r2)) : S(0);
+  row.q1 = boundary ? S(1) : S(r2 / (r1 + r2));
+  row.q2 = boundary ? S(0) : S(r1 / (r1 + r2));
   row.mass = reciprocal<S>(row.q1 * row.q1 * spin1 + row.q2 * row.q2 * spin2);
   row.rolling = material.rollingFriction;
   row.spinning = material.spinningFriction;

@@ -153,9 +153,10 @@ void integrateEpicycle(const HillFrame<Scalar>& frame, Bodies<Scalar, Layout>& b
 }
 
 /// Brings bodies that left a periodic box back in through the other side. \return the energy that they have
-/// more there [J]: what the shear of a disc puts in
+/// more there [J]: what the shear of a disc puts in, and a uniform field over the length of the box
 template <Real Scalar, class Layout>
-Scalar wrapBodies(Bodies<Scalar, Layout>& bodies, const Domain<Scalar>& domain, const Scalar& time) {
+Scalar wrapBodies(Bodies<Scalar, Layout>& bodies, const Domain<Scalar>& domain, const Scalar& time,
+                  const Vector3<Scalar>& field) {
   if (domain.isOpen()) {
     return Scalar(0);
   }
@@ -173,6 +174,9 @@ Scalar wrapBodies(Bodies<Scalar, Layout>& bodies, const Domain<Scalar>& domain, 
       }
       bodies[i].position() = x;
       bodies[i].velocity() = v;
+      if (!bodies[i].isFixed()) {
+        gained -= Scalar(bodies[i].mass()) * field.dot(Vector3<Scalar>(x - x0));
+      }
       if (frame.turns()) {
         gained += Scalar(bodies[i].mass()) * (Vector3<Scalar>(v - v0).dot(v + v0) / Scalar(2) +
                                               (frame.potential(x) - frame.potential(x0)));

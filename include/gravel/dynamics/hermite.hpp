@@ -94,7 +94,10 @@ class Hermite4 {
   std::uint64_t bodySteps() const { return bodySteps_; }    ///< bodies moved there
 
   /// What the next step depends on beside the bodies: numbers for a restart.
-  std::vector<Scalar> state() const { return s_.numbers(); }
+  template <class Layout>
+  std::vector<Scalar> state(const Bodies<Scalar, Layout>& bodies) const {
+    return s_.numbers(bodies);
+  }
   /// Takes up state(). \return false, and knows nothing, if it is none
   template <class Layout>
   bool setState(const Bodies<Scalar, Layout>& bodies, const std::vector<Scalar>& numbers) {

@@ -30,13 +30,7 @@ struct HermiteState {
   template <class Layout>
   bool read(const Bodies<Scalar, Layout>& bodies) {
     const std::size_t n = bodies.size();
-    bool same = left_.size() == n;
-    if (same) {
-      for (std::size_t i = 0; i < n && same; ++i) {
-        same = left_[i] == Left(bodies, i);
-      }
-    }
-    if (same) {
+    if (isLeftAs(bodies)) {
       return true;
     }
     order(bodies);
@@ -80,13 +74,24 @@ struct HermiteState {
     }
   }
 
-  /// Seven a body: a, j and the step wanted; none if nothing is known.
-  std::vector<Scalar> numbers() const {
+  /// Seven a body: a, j and the step wanted; none if nothing is known of these bodies as they are now.
+  template <class Layout>
+  std::vector<Scalar> numbers(const Bodies<Scalar, Layout>& bodies) const {
     std::vector<Scalar> all;
-    if (!left_.empty()) {
+    if (isLeftAs(bodies)) {
       eachColumn(*this, [&](const Column& c) { all.insert(all.end(), c.data(), c.data() + c.size()); });
     }
     return all;
+  }
+
+  /// Whether these are the bodies of remember(), and nobody has changed them since.
+  template <class Layout>
+  bool isLeftAs(const Bodies<Scalar, Layout>& bodies) const {
+    bool same = left_.size() == bodies.size();
+    for (std::size_t i = 0; same && i < left_.size(); ++i) {
+      same = left_[i] == Left(bodies, i);
+    }
+    return same;
   }
 
   /// Takes up numbers() of these bodies. \return false, and is empty, if they are none

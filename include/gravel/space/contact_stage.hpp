@@ -35,7 +35,10 @@ class ContactStage {
   const ContactReport<Scalar>& report() const { return report_; }
 
   /// Brings bodies back into the domain. \return the energy that they have more there [J]
-  Scalar wrap(Bodies& bodies, const Scalar& time) const { return wrapBodies(bodies, domain, time); }
+  /// \param field [m s^-2]
+  Scalar wrap(Bodies& bodies, const Scalar& time, const Vector3<Scalar>& field) const {
+    return wrapBodies(bodies, domain, time, field);
+  }
 
   /// Finds all contacts at the present positions, for steps of length h [s]. All pairs as near as what rests
   /// are taken to rest; those of the last step alone, if `goesOn`.

@@ -88,8 +88,12 @@ class ForceStage {
     for (std::size_t i = 0; i < hookForces_.size() && i < bodies.size(); ++i) {
       const auto body = bodies[i];
       if (!body.isFixed()) {
-        power += hookForces_[i].dot(Vector3<Scalar>(body.velocity())) +
-                 Vector3<Scalar>(body.torque()).dot(Vector3<Scalar>(body.angularVelocity()));
+        if (body.inverseMass() > Scalar(0)) {
+          power += hookForces_[i].dot(Vector3<Scalar>(body.velocity()));
+        }
+        if (body.inverseInertia() > Scalar(0)) {
+          power += Vector3<Scalar>(body.torque()).dot(Vector3<Scalar>(body.angularVelocity()));
+        }
       }
     }
     return power;
@@ -104,10 +108,11 @@ class ForceStage {
     return force;
   }
 
-  /// What the hook gave to the present forces, three numbers a body; empty without one. For a restart.
-  std::vector<Scalar> hookParts() const {
+  /// What the hook gave to the present forces, three numbers a body; empty without one, and if it was asked
+  /// for other bodies than these n. For a restart.
+  std::vector<Scalar> hookParts(std::size_t n) const {
     std::vector<Scalar> parts;
-    for (std::size_t i = 0; hook && i < hookForces_.size(); ++i) {
+    for (std::size_t i = 0; hook && hookForces_.size() == n && i < n; ++i) {
       parts.insert(parts.end(), {hookForces_[i][0], hookForces_[i][1], hookForces_[i][2]});
     }
     return parts;

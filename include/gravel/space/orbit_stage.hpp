@@ -90,7 +90,7 @@ class OrbitStage {
     out.array("Gauss-Radau", state.data(), state.size());
     const std::vector<Scalar> lost = wisdomHolman_.lost().lostParts(bodies);
     out.array("Wisdom-Holman", lost.data(), lost.size());
-    const std::vector<Scalar> hermite = hermite_.state();
+    const std::vector<Scalar> hermite = hermite_.state(bodies);
     out.array("Hermite", hermite.data(), hermite.size());
   }
 

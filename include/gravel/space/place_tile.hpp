@@ -73,7 +73,10 @@ struct PlaceTile {
       return c == 4 ? Scalar(body.radius()) : Scalar(body.inertiaFactor());
     }
     const Scalar m = body.mass();
-    return body.isFixed() ? Scalar(-m - Scalar(1)) : m;
+    if (!body.isFixed()) {
+      return m;
+    }
+    return m > Scalar(0) ? Scalar(-m) : Scalar(-Eigen::NumTraits<Scalar>::highest());
   }
 };
 

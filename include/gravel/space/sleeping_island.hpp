@@ -99,7 +99,7 @@ bool asItWas(const Bodies<Scalar, Layout>& bodies, const SleepingIsland<Scalar>&
   };
   const auto support = [&](const RestingBody<Scalar>& known) {
     const auto i = placeOf(bodies, known);
-    return i && known.holds(bodies[*i]);  // freed, it is awake itself, and touches
+    return i && known.holds(bodies[*i]) && !detail::isMovable(bodies, *i);
   };
   return std::all_of(island.members.begin(), island.members.end(), member) &&
          std::all_of(island.supports.begin(), island.supports.end(), support);

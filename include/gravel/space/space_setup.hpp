@@ -78,17 +78,19 @@ void Space<Scalar, Layout>::reorderBodies() {
 template <Real Scalar, class Layout>
 std::size_t Space<Scalar, Layout>::addPlane(const Vector& normal, Scalar offset, MaterialId material) {
   contact_.materials.check(static_cast<std::uint32_t>(material), "the new plane");
+  const Plane<Scalar> plane = makePlane(normal, offset, material);
   wakeAll();
-  return contact_.boundaries.add(makePlane(normal, offset, material));
+  return contact_.boundaries.add(plane);
 }
 
 template <Real Scalar, class Layout>
 std::vector<std::size_t> Space<Scalar, Layout>::addBox(const Vector& low, const Vector& high,
                                                        MaterialId material, BoxFaces open) {
   contact_.materials.check(static_cast<std::uint32_t>(material), "the new box");
+  const auto faces = makeBox(low, high, material, open);
   wakeAll();
   std::vector<std::size_t> numbers;
-  for (const Plane<Scalar>& face : makeBox(low, high, material, open)) {
+  for (const Plane<Scalar>& face : faces) {
     numbers.push_back(contact_.boundaries.add(face));
   }
   return numbers;

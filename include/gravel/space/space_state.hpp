@@ -219,7 +219,7 @@ void Space<Scalar, Layout>::save(const std::string& path) const {
   saveBodies(bodies_, out);
   const std::vector<Scalar> lost = lost_.lostParts(bodies_);
   out.array("lost parts", lost.data(), lost.size());
-  const std::vector<Scalar> ofHook = force_.hookParts();
+  const std::vector<Scalar> ofHook = force_.hookParts(n());
   out.array("forces of the hook", ofHook.data(), ofHook.size());
   orbits_.save(bodies_, out);
   out.write(path);

@@ -119,6 +119,7 @@ void Space<Scalar, Layout>::prepare() {
   contact_.materials.check(bodies_);
   orbits_.check(this->config_.integrator, bodies_, contact_, force_);
   wakeTheChanged();
+  contact_.setIdle(false);  // until fallAsleep() has looked at those that came or woke
   while (!forcesValid_ || placesChanged()) {
     applyGravity();
     buildCollisionGraph();

@@ -145,7 +145,7 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
   }
   const auto arrival = [&] {
     contact_.boundaries.advance(contact_dt_);
-    left_.work -= contact_.wrap(bodies_, Scalar(time_ + end));
+    left_.work -= contact_.wrap(bodies_, Scalar(time_ + end), force_.field);
     contact_.detect(bodies_, this->config_, Scalar(time_ + end), contact_dt_, true, profiler_);
     contact_.separate(bodies_, this->config_, Scalar(time_ + end), profiler_);
   };
