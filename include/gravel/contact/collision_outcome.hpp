@@ -91,7 +91,7 @@ namespace detail {
 /// \throws std::invalid_argument unless the velocities that bodies are to have are finite
 template <Real Scalar>
 CollisionOutcome<Scalar> outcomeOf(const CollisionHook<Scalar>& hook, const Collision<Scalar>& hit) {
-  const CollisionOutcome<Scalar> outcome = hook(hit);
+  CollisionOutcome<Scalar> outcome = hook(hit);
   if (outcome.kind > CollisionKind::Velocities) {
     refuse("kind of a collision's outcome", std::to_string(static_cast<int>(outcome.kind)),
            "a value of its enumeration");
