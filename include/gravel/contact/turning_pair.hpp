@@ -12,14 +12,15 @@
 ///   w x n + h/(2 D) w x (w x n),
 /// has the part h/(2 D) (w.n) w_t across n, which is the slip of the tangent at the start. Without either,
 /// aggregates that turn as one grew by (h omega)^2/2 in every step, and friction held what should close
-/// again. A half-space does not turn.
+/// again. A half-space does not turn. Below a small share of the accelerations both fade, as restitution does
+/// at low speeds: with them a ball that rocks in the hollow of a heap loses nothing, and goes on for ever.
 
 #include <gravel/contact/row_lanes.hpp>
 
 namespace gravel::detail {
 
-/// What a body's own turn or that of a pair adds to accelerations, over what these are, from which on it
-/// counts.
+/// What the turn of a pair adds to accelerations, over what these are, from which on it counts: of a pair at
+/// a 23rd of the spin at which its own gravity would let it part.
 template <Real S>
 S turningShare() {
   return S(1) / S(512);
@@ -58,6 +59,8 @@ struct TurningPair {
     turning.slip = choose(rolls, P::all(S(1) / S(2)) * rate * w_n * (w - w_n * n), V::zero());
     const P little = P::all(S(turningShare<S>() / S(2)) * h) * scaledLanes(falls, exponent);
     turning.counts = (turning.approach > little) | (turning.slip.sumAbs() > little);
+    turning.approach = choose(turning.counts, turning.approach, zero);
+    turning.slip = choose(turning.counts, turning.slip, V::zero());
     return turning;
   }
 };
