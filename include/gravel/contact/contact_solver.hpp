@@ -152,9 +152,6 @@ class ContactSolver {
 
   const std::vector<Displacement<S>>& displacements() const { return correction_.displacements(); }
 
-  /// Whether spin matters to a contact of begin().
-  bool hasFriction() const { return facts_.kinds.rub || facts_.kinds.turn; }
-
   /// Contacts of begin(), which are the caller's, and the impulses [N s] of the last solve() in their order.
   /// O(contacts) once a solve; the view holds until the next one.
   const ContactView<S>& contacts() const { return contacts_; }

@@ -14,17 +14,15 @@ struct RowImpulses {
   using Group = RowGroup<S>;
   using Lanes = RowLanes<S>;
 
-  /// What a sweep did: largest change of a velocity, squared; and products, over mass, of the changes of the
-  /// impulses with the whole step since the sweep before, and with themselves.
+  /// What a sweep did: largest change of a velocity, squared; and the square, over mass, of the changes of
+  /// the impulses.
   struct Progress {
     S change_sq = S(0);
-    S along = S(0);
     S size = S(0);
     std::size_t changed = 0;  ///< rows by more than they may
     std::size_t looked = 0;   ///< rows that were not passed over
     Progress& operator+=(const Progress& other) {
       change_sq = std::max<S>(change_sq, other.change_sq);
-      along += other.along;
       size += other.size;
       changed += other.changed;
       looked += other.looked;
@@ -77,7 +75,7 @@ struct RowImpulses {
     row.step += dl;
     turn(row, b1, b2, dl);
     const Vector3<S> change = dl / row.mass;
-    return {change.squaredNorm(), change.dot(row.step), change.dot(dl)};
+    return {change.squaredNorm(), change.dot(dl)};
   }
 
   /// Takes down how far bodies were moved at most.

@@ -142,9 +142,6 @@ class ContactStage {
     settings.restitutionThreshold = std::max(config.restitutionThreshold, config.epsilon);
     settings.tolerance = config.contactTolerance;
     settings.maxIterations = static_cast<int>(config.contactIterations);
-    // One solve from nothing is right much sooner with momentum. From step to step it carries impulses on
-    // through the many solutions that friction leaves open: heaps lose the forces that hold them, and creep.
-    settings.accelerate = !solver_.hasFriction();
     solver_.setSettings(settings);
     solver_.rebind(contacts_);  // the space may be a copy
     const ContactReport<Scalar> half = solver_.solve(bodies, h, drifts);
