@@ -376,3 +376,23 @@ TEST_CASE("all who are moved are listed once, with what they moved by, for any n
   }
   omp_set_num_threads(before);
 }
+
+TEST_CASE("settings of the correction out of range are refused, and nothing is moved") {
+  Bodies<double, SoA> bodies = randomCloud<double>(40, 2.0, 5);
+  const auto contacts = contactsOf(bodies, Material<double>{});
+  REQUIRE_FALSE(contacts.empty());
+  const Vector3<double> x = bodies[0].position();
+  PositionalCorrection<double> correction;
+  const auto refuses = [&](auto&& change, const char* text) {
+    CorrectionSettings<double> settings;
+    change(settings);
+    CHECK_THROWS_WITH(correct(bodies, contacts, settings, correction), ContainsSubstring(text));
+  };
+  refuses([](auto& s) { s.factor = 1.5; }, "correction factor is 1.5; allowed: 0 to 1");
+  refuses([](auto& s) { s.slop = -1; }, "correction slop is -1");
+  refuses([](auto& s) { s.cap = 0; }, "correction cap is 0");
+  refuses([](auto& s) { s.tolerance = std::nan(""); }, "correction tolerance is nan");
+  refuses([](auto& s) { s.precision = -1; }, "correction precision is -1");
+  refuses([](auto& s) { s.maxIterations = 0; }, "correction maxIterations is 0");
+  CHECK(Vector3<double>(bodies[0].position()) == x);
+}

@@ -1,6 +1,7 @@
 #include "support/catch.hpp"
 #include <gravel/core/callback.hpp>
 
+#include <functional>
 #include <string>
 
 using gravel::Callback;
@@ -43,6 +44,16 @@ TEST_CASE("callback: takes functions, pointers to functions and objects", "[call
   CHECK(converted(short{21}) == 42L);
 }
 
+// Seen to fail: both are taken for something that can be called.
+TEST_CASE("callback: a null pointer and an empty std::function are nothing", "[callback]") {
+  int (*const none)(int) = nullptr;
+  CHECK_FALSE(static_cast<bool>(Callback<int(int)>(none)));
+  CHECK_FALSE(static_cast<bool>(Callback<int(int)>(std::function<int(int)>{})));
+  Callback<int(int)> callback = std::function<int(int)>(twice);
+  CHECK(callback(3) == 6);
+  callback = nullptr;
+  CHECK_FALSE(static_cast<bool>(callback));
+}
 TEST_CASE("callback: a result that nobody wants is dropped", "[callback]") {
   int calls = 0;
   const Callback<void(int)> callback = [&](int x) {

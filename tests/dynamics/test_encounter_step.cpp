@@ -204,3 +204,24 @@ TEST_CASE("The reversible step is its own inverse, and the step wanted where tha
   CHECK(reversibleStep(0.0, 1.0) == 1.0);
   CHECK(reversibleStep(1.0, 1e-300) == 1e-300);
 }
+
+// Seen to fail: a pair of fixed stars asks for steps of its fall, 4e-10.
+TEST_CASE("Fixed bodies ask for no step of each other, and all the same of what moves about them") {
+  const auto scene = [](bool second, bool pulled) {
+    std::vector<Body<double>> list(3);
+    list[0].mass = list[1].mass = 1e6;
+    list[0].position = {0, 0, 0};
+    list[1].position = {1e-4, 0, 0};
+    list[0].fixed = list[1].fixed = true;
+    list[2].mass = 1e-3;
+    list[2].position = {pulled ? 1.0 : 1e12, 0, 0};
+    if (!second) {
+      list.erase(list.begin() + 1);
+    }
+    return stepFromEncounters(made(list), 1.0, 0.0, StepLimits<double>{0.02, 0.0, 1.0});
+  };
+  CHECK_THAT(scene(true, false), WithinRel(1.0, 1e-12));
+  CHECK(scene(true, true) < 1e-3);
+  // A second star doubles the rate of each pair's square, two equal rates the eighth powers' sum.
+  CHECK_THAT(scene(true, true), WithinRel(scene(false, true) / std::pow(2.0, 0.125), 1e-3));
+}

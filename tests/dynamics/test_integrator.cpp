@@ -417,3 +417,12 @@ TEST_CASE("The step is the same bits for any number of threads") {
   omp_set_num_threads(threads);
 }
 #endif
+
+TEST_CASE("A method that has no kicks and drifts is refused, and nothing moves") {
+  auto bodies = orbiter<double>(0.5);
+  const Vector3<double> start = bodies[0].position();
+  for (const IntegratorKind kind : {IntegratorKind::GaussRadau15, IntegratorKind::Hermite4}) {
+    CHECK_THROWS_WITH(run(kind, bodies, 0.1, 1, KeplerForce{}), ContainsSubstring("integrator is"));
+  }
+  CHECK(Vector3<double>(bodies[0].position()) == start);
+}

@@ -4,6 +4,7 @@
 #include "support/threads.hpp"
 #include <gravel/bodies/bodies.hpp>
 #include <gravel/gravity/direct_sum.hpp>
+#include <gravel/gravity/gravity_solver.hpp>
 
 using namespace gravel;
 using namespace gravel::test;
@@ -273,6 +274,27 @@ TEST_CASE("an object can be used again for other sizes") {
     sum.accelerations(points.positions, points.masses, 1.0, 0.0, out);
     CHECK(out == accelerations(points));
     CHECK(sum.potentialEnergy(points.positions, points.masses, 1.0, 0.0) == potential(points));
+  }
+}
+
+// Seen to fail: the search for the row of such a body ran off the table; so did results beyond their column.
+TEST_CASE("a body that is not there, and a column too short for the results, are refused") {
+  const auto points = randomMasses<double>(20, 73);
+  DirectSum<double> sum;
+  CHECK_THROWS_WITH(sum.energyOf(20, points.positions, points.masses, 1.0, 0.0),
+                    ContainsSubstring("is 20; allowed: below the number of bodies, 20"));
+  for (const std::size_t bodies : {std::size_t{2}, std::size_t{20}}) {  // few ones have their own loop
+    const auto some = randomMasses<double>(bodies, 73);
+    std::vector<Vector3<double>> out(bodies - 1, Vector3<double>(9, 9, 9));
+    CHECK_THROWS_WITH(sum.accelerations(some.positions, some.masses, 1.0, 0.0, out),
+                      ContainsSubstring("length of accelerations is"));
+    CHECK(out == std::vector<Vector3<double>>(bodies - 1, Vector3<double>(9, 9, 9)));
+  }
+  GravitySolver<double> solver;
+  std::vector<Vector3<double>> none;
+  for (const double G : {0.0, 1.0}) {
+    CHECK_THROWS_WITH(solver.accelerations(points.positions, points.masses, G, 0.0, none),
+                      ContainsSubstring("length of accelerations is 0"));
   }
 }
 

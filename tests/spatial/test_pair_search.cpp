@@ -239,3 +239,18 @@ TEST_CASE("a user's own scalar is searched by all pairs, whatever was asked for"
   CHECK(std::string(method.name()) == "all pairs");
   CHECK(named(pairs, plain) == brutePairs(plain, 0.0, Domain<double>::periodic({1, 1, 1}), 0.0));
 }
+
+// Seen to fail: an extent that overflows gave a number of cells that is not a number.
+TEST_CASE("places at the ends of the scalar's range are searched as one cell") {
+  for (const BroadPhaseKind kind : everyKind) {
+    BroadPhase<double> method(kind);
+    auto cloud = randomCloud<double>(200, 1.0, 0.1, 1.0, 31);
+    cloud.positions[0] = {1.7e308, 0, 0};
+    cloud.positions[1] = {-1.7e308, 0, 0};
+    std::vector<Pair> pairs;
+    method.findPairs(cloud.positions, cloud.radii, cloud.ids, 0.0, Domain<double>::open(), 0.0, pairs);
+    CHECK(pairs.size() > 100);
+    CHECK(
+        std::none_of(pairs.begin(), pairs.end(), [](const Pair& p) { return p.first < 2 || p.second < 2; }));
+  }
+}

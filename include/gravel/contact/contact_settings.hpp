@@ -68,7 +68,10 @@ struct ContactImpulse {
 template <Real S>
 void validate(const ContactSettings<S>& settings) {
   detail::require("restitutionThreshold", settings.restitutionThreshold, detail::nonNegative<S>());
-  detail::require("contact tolerance", settings.tolerance, detail::Range<S>{S(1e-30), S(1), "1e-30 to 1"});
+  auto tolerance = detail::positive<S>();
+  tolerance.high = S(1);
+  tolerance.text = "> 0, <= 1";
+  detail::require("contact tolerance", settings.tolerance, tolerance);
   if (settings.maxIterations < 1) {
     detail::refuse("contact maxIterations", std::to_string(settings.maxIterations), ">= 1");
   }

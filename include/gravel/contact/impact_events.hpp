@@ -2,7 +2,6 @@
 
 /// \file
 /// Impacts inside a step, each at its own time and in their order.
-///
 /// A body drifts from x with velocity v through a step of length h while its acceleration a, taken as
 /// constant, bends the path to x + v t - a t (h - t)/2, at v + a (t - h/2) (time_of_impact.hpp). A blow J at
 /// t changes v by J/m and x by -t J/m: so afterwards the same drift, x + v h, ends where the body is after
@@ -10,6 +9,7 @@
 /// field that is exact; with forces that change along the way it is of second order in h.
 
 #include <gravel/contact/collision_outcome.hpp>
+#include <gravel/contact/contact_search.hpp>
 #include <gravel/contact/impact_forecast.hpp>
 #include <gravel/core/memory.hpp>
 
@@ -131,6 +131,7 @@ class ImpactEvents : private detail::ImpactForecast<S> {
   const std::vector<Pair>& candidatesAdded() const { return late_; }
   /// The blows of the last call, in the order in which they were dealt.
   const std::vector<Impact<S>>& impacts() const { return impacts_; }
+  std::vector<Impact<S>>& impacts() { return impacts_; }
   /// Changes of spin of the last call, in that order.
   const std::vector<TurnChange<S>>& turns() const { return turns_; }
 
@@ -150,10 +151,9 @@ class ImpactEvents : private detail::ImpactForecast<S> {
     Vector3<S> n;
     S distance(0);
     S a_n(0);
-    Side one;
-    Side two;
+    Side one, two;
     Material<S> material;
-    const Material<S>& surface1 = scene.materials[bodies.materials()[event.first]];
+    const Material<S>& surface1 = detail::surfaceOf(scene.materials, bodies.materials()[event.first]);
     if (boundary) {
       const HalfSpace<S>& wall = scene.walls[event.wall];
       n = -wall.normal;
@@ -180,7 +180,7 @@ class ImpactEvents : private detail::ImpactForecast<S> {
       two = Side::of(scene, event.second, touch->arm2, t);
       const std::uint32_t m1 = bodies.materials()[event.first];
       const std::uint32_t m2 = bodies.materials()[event.second];
-      material = m1 == m2 ? surface1 : mix(surface1, scene.materials[m2]);
+      material = m1 == m2 ? surface1 : mix(surface1, detail::surfaceOf(scene.materials, m2));
     }
     const Vector3<S> v_rel = two.v - one.v + drift;
     const S v_n = n.dot(v_rel);

@@ -149,6 +149,9 @@ class ImpactForecast {
 
   /// Pairs of each body, as places in the list.
   void link(std::size_t n, std::span<const Pair> pairs) {
+    if (pairs.size() > std::numeric_limits<std::uint32_t>::max() / 2) {
+      detail::refuse("number of pairs that may meet", std::to_string(pairs.size()), "below 2^31");
+    }
     start_.assign(n + 1, 0);
     for (const Pair& pair : pairs) {
       ++start_[pair.first];
@@ -175,9 +178,10 @@ class ImpactForecast {
         predict(scene, pair, from);
       }
     }
-    for (std::uint32_t w = 0; w < scene.walls.size(); ++w) {
+    const S radius = scene.bodies.radii()[body];
+    const bool meets = radius > S(0) && detail::isMovable(scene.bodies, body);
+    for (std::uint32_t w = 0; meets && w < scene.walls.size(); ++w) {
       const HalfSpace<S>& wall = scene.walls[w];
-      const S radius = scene.bodies.radii()[body];
       const RelativeFlight<S> flight = flightOf(scene, body, wall);
       const std::uint64_t key1 = scene.bodies.ids()[body];
       const std::uint64_t key2 = boundaryKey(scene.walls[w].number);

@@ -7,6 +7,7 @@
 #include <gravel/contact/contact_facts.hpp>
 #include <gravel/contact/overlap_lanes.hpp>
 #include <gravel/contact/row_watch.hpp>
+#include <gravel/core/check.hpp>
 #include <gravel/core/memory.hpp>
 #include <gravel/core/parallel.hpp>
 
@@ -31,6 +32,19 @@ struct CorrectionSettings {
   /// A pair that is moved apart keeps its angular momentum: it turns the slower. Off: velocities stay.
   bool keepAngularMomentum = true;
 };
+
+/// \throws std::invalid_argument naming the setting, its value and what is allowed
+template <Real S>
+void validate(const CorrectionSettings<S>& settings) {
+  detail::require("correction factor", settings.factor, detail::Range<S>{S(0), S(1), "0 to 1"});
+  detail::require("correction slop", settings.slop, detail::nonNegative<S>());
+  detail::require("correction cap", settings.cap, detail::positive<S>());
+  detail::require("correction tolerance", settings.tolerance, detail::positive<S>());
+  detail::require("correction precision", settings.precision, detail::nonNegative<S>());
+  if (settings.maxIterations < 1) {
+    detail::refuse("correction maxIterations", std::to_string(settings.maxIterations), ">= 1");
+  }
+}
 
 /// A body that was moved, and by how much [m].
 template <Real Scalar>
@@ -64,9 +78,11 @@ class PositionalCorrection {
   /// Moves the bodies so that each overlap is (1 - factor) of what it was, down to the slop, unless the cap
   /// holds it back.
   /// \param colouring of these contacts \param facts of them, overlaps as they are now
+  /// \throws std::invalid_argument on a setting out of range; then nothing is moved
   template <ContactBodies B>
   CorrectionReport<S> apply(std::span<const Contact<S>> contacts, const ContactColoring& colouring, B& bodies,
                             const CorrectionSettings<S>& settings, const ContactFacts<S>& facts) {
+    validate(settings);
     moved_.clear();
     CorrectionReport<S> report;
     report.largestOverlap = facts.overlap;

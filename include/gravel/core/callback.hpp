@@ -5,6 +5,7 @@
 /// including file a fifth of a second.
 
 #include <concepts>
+#include <cstddef>
 #include <memory>
 #include <type_traits>
 #include <utility>
@@ -19,19 +20,31 @@ template <class R, class... Args>
 class Callback<R(Args...)> {
  public:
   Callback() = default;
+  Callback(std::nullptr_t) {}  // NOLINT(google-explicit-constructor)
 
+  /// Empty if `f` is a null pointer or an empty `std::function`.
   template <class F>
     requires(!std::same_as<std::remove_cvref_t<F>, Callback> &&
              std::is_invocable_r_v<R, std::decay_t<F>&, Args...>)
-  Callback(F&& f)  // NOLINT(bugprone-forwarding-reference-overload,google-explicit-constructor)
-      : target_(std::make_shared<std::decay_t<F>>(std::forward<F>(f))),
-        call_([](void* target, Args... args) -> R {
-          if constexpr (std::is_void_v<R>) {
-            (*static_cast<std::decay_t<F>*>(target))(std::forward<Args>(args)...);
-          } else {
-            return (*static_cast<std::decay_t<F>*>(target))(std::forward<Args>(args)...);
-          }
-        }) {}
+  Callback(F&& f) {  // NOLINT(bugprone-forwarding-reference-overload,google-explicit-constructor)
+    using Target = std::decay_t<F>;
+    auto target = std::make_shared<Target>(std::forward<F>(f));
+    if constexpr (requires(const Target& f0) {
+                    requires std::is_convertible_v<decltype(f0 == nullptr), bool>;
+                  }) {
+      if (*target == nullptr) {
+        return;
+      }
+    }
+    target_ = std::move(target);
+    call_ = [](void* callable, Args... args) -> R {
+      if constexpr (std::is_void_v<R>) {
+        (*static_cast<Target*>(callable))(std::forward<Args>(args)...);
+      } else {
+        return (*static_cast<Target*>(callable))(std::forward<Args>(args)...);
+      }
+    };
+  }
 
   explicit operator bool() const { return call_ != nullptr; }
 

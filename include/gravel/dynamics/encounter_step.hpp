@@ -41,7 +41,7 @@ class EncounterTable {
 
   template <class BodiesType>
   explicit EncounterTable(const BodiesType& bodies) : n_(static_cast<Eigen::Index>(bodies.size())) {
-    for (Column* c : {&x_, &y_, &z_, &u_, &v_, &w_, &m_, &r_}) {
+    for (Column* c : {&x_, &y_, &z_, &u_, &v_, &w_, &m_, &r_, &free_}) {
       c->resize(n_);
     }
     for (Eigen::Index i = 0; i < n_; ++i) {
@@ -52,6 +52,7 @@ class EncounterTable {
       u_[i] = v[0], v_[i] = v[1], w_[i] = v[2];
       m_[i] = S(body.mass());
       r_[i] = S(body.radius());
+      free_[i] = body.isFixed() ? S(0) : S(1);
       spheres_ = spheres_ || r_[i] > S(0);
     }
   }
@@ -67,6 +68,9 @@ class EncounterTable {
       s = (x_.tail(k) - x_[i]).square() + (y_.tail(k) - y_[i]).square() + (z_.tail(k) - z_[i]).square();
       speed_sq =
           (u_.tail(k) - u_[i]).square() + (v_.tail(k) - v_[i]).square() + (w_.tail(k) - w_[i]).square();
+      if (free_[i] == S(0)) {
+        speed_sq *= free_.tail(k);
+      }
       if (spheres_) {
         a = r_.tail(k).min(r_[i]);
         a = (a > S(0)).select(a, r_.tail(k) + r_[i]) / S(4);
@@ -78,6 +82,9 @@ class EncounterTable {
       s = (s + softening * softening).max(S(1e-60)).inverse();
       a = speed_sq * s * T_sq;
       b = ((m_.tail(k) + m_[i]) * (G * T_sq)).square() * (s * s * s);
+      if (free_[i] == S(0)) {
+        b *= free_.tail(k);
+      }
       sum += (b * (a * a + b)).sum() / S(2);
     }
   }
@@ -85,6 +92,7 @@ class EncounterTable {
  private:
   Eigen::Index n_;
   Column x_, y_, z_, u_, v_, w_, m_, r_;
+  Column free_;  ///< 0 for fixed bodies, which ask nothing of each other
   bool spheres_ = false;
 };
 

@@ -131,7 +131,7 @@ struct NoDeparture {
 
 /// Advances all bodies by one step h. Accelerations must be those of the present positions, and are at the
 /// end.
-/// \param kind  one whose traits have stages
+/// \throws std::invalid_argument for a kind whose traits have no stages
 /// \param forces  called with the part of h that has passed [s]: accelerations at the present positions; as
 ///   often as the traits' forceEvaluations say
 /// \param arrival  called once, when positions are final and the last forces are not yet evaluated
@@ -143,6 +143,9 @@ void integrate(IntegratorKind kind, Bodies<Scalar, Layout>& bodies, const Scalar
                Forces&& forces, Arrival&& arrival, Departure&& departure = {},
                Compensation<Scalar>* lost = nullptr) {
   const IntegratorTraits method = traitsOf(kind);
+  if (method.stages.empty()) {
+    detail::refuse("integrator", method.name, "one that has stages of kicks and drifts");
+  }
   if (!Compensation<Scalar>::carries) {
     lost = nullptr;
   }

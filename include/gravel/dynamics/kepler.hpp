@@ -57,6 +57,10 @@ void keplerIncrements(const Vector3<Scalar>& x, const Vector3<Scalar>& v, const 
   const Scalar eta = x.dot(v);
   const Scalar beta = Scalar(2) * GM / r0 - v.squaredNorm();
   const Scalar zeta = GM - beta * r0;
+  if (!(r0 > Scalar(0)) || !isFinite(beta)) {
+    dx = dv = Vector3<Scalar>::Constant(Scalar(Scalar(0) / r0));
+    return;
+  }
   // The root lies between low and high; a turn more or less of an ellipse changes nothing.
   Scalar low(0);
   Scalar high(0);
@@ -64,11 +68,12 @@ void keplerIncrements(const Vector3<Scalar>& x, const Vector3<Scalar>& v, const 
   if (beta > Scalar(0)) {
     const Scalar turn = Scalar(2) * pi<Scalar>() / sqrt(beta);  // of s
     const Scalar period = turn * GM / beta;
+    const bool turned = period > Scalar(0) && isFinite(period);
     Scalar turns = period;  // whole turns are taken off, most of them first
-    while (turns < h || turns < -h) {
+    while (turned && (turns < h || turns < -h)) {
       turns *= Scalar(2);
     }
-    while (turns >= period) {
+    while (turned && turns >= period) {
       h += h > turns ? Scalar(-turns) : h < -turns ? turns : Scalar(0);
       turns /= Scalar(2);
     }

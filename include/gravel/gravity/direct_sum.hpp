@@ -6,6 +6,8 @@
 #include <gravel/gravity/direct_rows.hpp>
 #include <gravel/gravity/few_bodies.hpp>
 
+#include <array>
+
 namespace gravel {
 
 /// Sums Newton's law (with Plummer's softening) over all pairs. Positions and masses are copied into columns
@@ -30,6 +32,7 @@ class DirectSum : public detail::DirectRows<S> {
   template <class Positions, class Masses, class Accelerations>
   void accelerations(const Positions& positions, const Masses& masses, const S& G, const S& softening,
                      Accelerations&& out) {
+    detail::requireRoom(out, positions.size());
     if constexpr (detail::FewBodies<S>::usable) {
       if (images_.isOpen() && detail::FewBodies<S>::accelerations(positions, masses, G, softening, out)) {
         return;
@@ -51,6 +54,7 @@ class DirectSum : public detail::DirectRows<S> {
   template <class Numbers, class Positions, class Masses, class Accelerations>
   void accelerationsOf(const Numbers& numbers, const Positions& positions, const Masses& masses, const S& G,
                        const S& softening, Accelerations&& out) {
+    detail::requireRoom(out, positions.size());
     detail::requireBodies(numbers, positions.size());
     gather(positions, masses, G, softening);
     this->gatherSinks(numbers, positions);
@@ -88,6 +92,7 @@ class DirectSum : public detail::DirectRows<S> {
   template <class Positions, class Masses>
   S energyOf(std::size_t i, const Positions& positions, const Masses& masses, const S& G,
              const S& softening) {
+    detail::requireBodies(std::array{i}, positions.size());
     gather(positions, masses, G, softening);
     std::size_t own = 0;
     while (body_[own] != i) {
@@ -199,8 +204,9 @@ class DirectSum : public detail::DirectRows<S> {
     }
     farImages_.gather(images_, table_.x.data(), table_.y.data(), table_.z.data(), table_.m.data(), n);
     for (const auto& [begin, last] : {std::pair{std::size_t{0}, n}, std::pair{tracerBegin_, table_.size()}}) {
-      farImages_.addTo(last - begin, &table_.x[begin], &table_.y[begin], &table_.z[begin], &table_.ax[begin],
-                       &table_.ay[begin], &table_.az[begin], nullptr);
+      const auto at = [from = begin](auto& column) { return column.data() + from; };
+      farImages_.addTo(last - begin, at(table_.x), at(table_.y), at(table_.z), at(table_.ax), at(table_.ay),
+                       at(table_.az), nullptr);
     }
   }
 

@@ -53,6 +53,7 @@ class FastMultipole {
   template <class Positions, class Masses, class Accelerations>
   void accelerations(const Positions& positions, const Masses& masses, const S& G, const S& softening,
                      Accelerations&& out) {
+    detail::requireRoom(out, positions.size());
     evaluate(positions, masses, G, softening, false);
     const auto factor = units_.acceleration(G);
     parallelFor(tree_.size(), 4096, [&](std::size_t row) {
@@ -67,6 +68,7 @@ class FastMultipole {
   template <class Numbers, class Positions, class Masses, class Accelerations>
   void accelerationsOf(const Numbers& numbers, const Positions& positions, const Masses& masses, const S& G,
                        const S& softening, Accelerations&& out) {
+    detail::requireRoom(out, positions.size());
     detail::requireBodies(numbers, positions.size());
     wanted_.assign(positions.size(), 0);
     for (std::size_t k = 0; k < numbers.size(); ++k) {

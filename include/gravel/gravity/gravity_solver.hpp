@@ -62,6 +62,7 @@ class GravitySolver {
   void accelerations(const Positions& positions, const Masses& masses, const S& G, const S& softening,
                      Accelerations&& out) {
     if (G == S(0)) {
+      detail::requireRoom(out, positions.size());
       for (std::size_t i = 0; i < positions.size(); ++i) {
         out[i] = Vector3<S>(Vector3<S>::Zero());
       }
@@ -76,6 +77,7 @@ class GravitySolver {
   void accelerationsOf(const Numbers& numbers, const Positions& positions, const Masses& masses, const S& G,
                        const S& softening, Accelerations&& out) {
     if (G == S(0)) {
+      detail::requireRoom(out, positions.size());
       detail::requireBodies(numbers, positions.size());
       for (std::size_t k = 0; k < numbers.size(); ++k) {
         out[static_cast<std::size_t>(numbers[k])] = Vector3<S>(Vector3<S>::Zero());

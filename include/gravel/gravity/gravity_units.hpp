@@ -21,6 +21,18 @@ void requireBodies(const Numbers& numbers, std::size_t bodies) {
   }
 }
 
+/// Where a column of results knows its length, it has room for all bodies.
+/// \throws std::invalid_argument otherwise
+template <class Accelerations>
+void requireRoom(const Accelerations& out, std::size_t bodies) {
+  if constexpr (requires { out.size(); }) {
+    if (static_cast<std::size_t>(out.size()) < bodies) {
+      refuse("length of accelerations", std::to_string(out.size()),
+             "at least the number of bodies, " + std::to_string(bodies));
+    }
+  }
+}
+
 /// Powers of two near the extent and the largest mass of a system, so that conversions are exact.
 template <Real S>
 class GravityUnits {

@@ -12,7 +12,8 @@
 
 namespace gravel {
 
-/// Terms of the virial theorem over a step, about the centre of mass [J]:
+/// Terms of the virial theorem over a step, about the centre of mass [J], in an open domain (x of what hangs
+/// together across a periodic face is not one place):
 ///   I''/2 = motion + forces + contacts + boundaries,   I = sum m x^2.
 /// In a heap at rest the sum vanishes, whatever friction does: forces along the line of two centres do the
 /// work N d, friction across it none.

@@ -70,6 +70,9 @@ class ContactStage {
   struct Touches {
     ContactList<Scalar> contacts;
     std::vector<ContactImpulse<Scalar>> impulses;
+
+    /// By the indices of now, without those of bodies that are gone since.
+    void keepPresent(const Bodies& bodies);
   };
   Touches allTouches() const;
 
@@ -141,7 +144,8 @@ class ContactStage {
     ContactSettings<Scalar> settings = solver_.settings();
     settings.restitutionThreshold = std::max(config.restitutionThreshold, config.epsilon);
     settings.tolerance = config.contactTolerance;
-    settings.maxIterations = static_cast<int>(config.contactIterations);
+    settings.maxIterations =
+        static_cast<int>(std::min<std::size_t>(config.contactIterations, std::numeric_limits<int>::max()));
     solver_.setSettings(settings);
     solver_.rebind(contacts_);  // the space may be a copy
     const ContactReport<Scalar> half = solver_.solve(bodies, h, drifts);
@@ -159,6 +163,9 @@ class ContactStage {
     contactsChanged();
     moved_ = false;
   }
+
+  /// \throws std::invalid_argument for a sphere that would touch its own image
+  void checkSizes(const Bodies& bodies) const;
 
   /// A new step: its report starts empty.
   void beginStep() {
@@ -180,21 +187,9 @@ class ContactStage {
     }
   }
 
-  /// The bodies stand in a new order.
-  void renumber(const Bodies& bodies) {
-    for (Contact<Scalar>& c : contacts_) {
-      c.first = static_cast<std::uint32_t>(bodies.indexOf(BodyId{c.key1}));
-      if (c.second != staticPartner) {
-        c.second = static_cast<std::uint32_t>(bodies.indexOf(BodyId{c.key2}));
-      }
-    }
-    if (coloured_) {
-      resumed_ = solver_.solved();  // the solver counts bodies by ids: it goes on as if nothing had been
-      coloured_ = false;
-    }
-    known_ = false;  // indices are others
-    moved_ = false;
-  }
+  /// The bodies stand in a new order: contacts and impacts know theirs by id. Those of bodies that are gone
+  /// stay as they are.
+  void renumber(const Bodies& bodies);
 
   /// Impulses of all solves of the step [N s], in the order of contacts(). A contact that ended in a drift is
   /// not among them. O(contacts).
@@ -225,6 +220,10 @@ class ContactStage {
   void load(SnapshotReader& in);
 
  private:
+  /// A contact or an impact, by the ids of its bodies. \return whether they are there
+  template <class Pair>
+  static bool renumber(const Bodies& bodies, Pair& pair);
+
   /// The share of the first half step's impulses J in the work of gravity and the field over the step. Kicks
   /// do the work m a.(v before + v after) kick/2, and the drift takes it out of the potential at the velocity
   /// in between. What J changes in the drift and in all later kicks, but not in the first one, leaves

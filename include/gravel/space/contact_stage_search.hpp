@@ -59,6 +59,21 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
 }
 
 template <Real Scalar, class Layout>
+void ContactStage<Scalar, Layout>::checkSizes(const Bodies& bodies) const {
+  if (domain.isOpen()) {
+    return;
+  }
+  const Scalar most = domain.lengths().minCoeff() / Scalar(2);
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    if (!(Scalar(bodies.radii()[i]) <= most)) {
+      detail::refuse("radius of body " + std::to_string(bodies.ids()[i]),
+                     detail::formatReal(Scalar(bodies.radii()[i])),
+                     "at most half an edge of the domain, " + detail::formatReal(most));
+    }
+  }
+}
+
+template <Real Scalar, class Layout>
 std::size_t ContactStage<Scalar, Layout>::touches() const {
   std::size_t count = contacts_.size();
   struck_.clear();
@@ -121,6 +136,50 @@ auto ContactStage<Scalar, Layout>::allTouches() const -> Touches {
     all.impulses.push_back(impact.impulse);
   }
   return all;
+}
+
+template <Real Scalar, class Layout>
+template <class Pair>
+bool ContactStage<Scalar, Layout>::renumber(const Bodies& bodies, Pair& pair) {
+  const auto first = bodies.find(BodyId{pair.key1});
+  const bool second = pair.second != staticPartner;
+  const auto other = second ? bodies.find(BodyId{pair.key2}) : first;
+  if (first && other) {
+    pair.first = static_cast<std::uint32_t>(*first);
+    pair.second = second ? static_cast<std::uint32_t>(*other) : staticPartner;
+  }
+  return first && other;
+}
+
+template <Real Scalar, class Layout>
+void ContactStage<Scalar, Layout>::renumber(const Bodies& bodies) {
+  for (Contact<Scalar>& c : contacts_) {
+    (void)renumber(bodies, c);
+  }
+  for (auto* all : {&impacts_.impacts(), &record_.impacts()}) {
+    for (Impact<Scalar>& impact : *all) {
+      (void)renumber(bodies, impact);
+    }
+  }
+  if (coloured_) {
+    resumed_ = solver_.solved();  // the solver counts bodies by ids: it goes on as if nothing had been
+    coloured_ = false;
+  }
+  known_ = false;  // indices are others
+  moved_ = false;
+}
+
+template <Real Scalar, class Layout>
+void ContactStage<Scalar, Layout>::Touches::keepPresent(const Bodies& bodies) {
+  Touches present;
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    Contact<Scalar> c = contacts[k];
+    if (renumber(bodies, c)) {
+      present.contacts.push_back(c, {});
+      present.impulses.push_back(impulses[k]);
+    }
+  }
+  *this = std::move(present);
 }
 
 template <Real Scalar, class Layout>

@@ -39,9 +39,10 @@ class MaterialTable {
     }
   }
 
-  /// The surfaces of two materials in contact, mixed.
+  /// The surfaces of two materials in contact, mixed. \throws std::invalid_argument, if there is none of them
   Material<Scalar> pair(MaterialId a, MaterialId b, const Config& config) const {
     const auto surface = [&](MaterialId id) {
+      check(static_cast<std::uint32_t>(id), "a pair");
       return id == defaultMaterial ? ownOf(config) : entries_[static_cast<std::size_t>(id)];
     };
     return mix(surface(a), surface(b));

@@ -50,7 +50,12 @@ BodyId Space<Scalar, Layout>::addBody(const Body<Scalar>& body) {
   const BodyId id = bodies_.add(body);
   forcesValid_ = false;
   if (ledgerOpen_) {
-    left_.exchange -= bindingEnergy(n() - 1, time_);
+    try {
+      left_.exchange -= bindingEnergy(n() - 1, time_);
+    } catch (...) {  // another body is not what it may be
+      bodies_.remove(id);
+      throw;
+    }
   }
   return id;
 }
@@ -69,8 +74,8 @@ template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::reorderBodies() {
   forcesValid_ = forcesValid_ && !placesChanged();
   bodies_.reorder(mortonOrder(bodies_.positions()));
-  if (forcesValid_) {  // forces moved along with their bodies, and contacts know theirs by id
-    contact_.renumber(bodies_);
+  contact_.renumber(bodies_);
+  if (forcesValid_) {  // they moved along with their bodies
     rememberPlaces();
   }
 }

@@ -44,6 +44,7 @@ template <Real Scalar, class Layout>
 auto Space<Scalar, Layout>::allTouches() const -> typename ContactStage<Scalar, Layout>::Touches {
   auto touches = contact_.allTouches();
   sleep_.addTouches(bodies_, touches, previous_dt_);
+  touches.keepPresent(bodies_);
   return touches;
 }
 

@@ -87,18 +87,14 @@ auto Space<Scalar, Layout>::planeForce(std::size_t plane) const -> Vector {
 template <Real Scalar, class Layout>
 std::vector<std::vector<std::size_t>> Space<Scalar, Layout>::collisionGraph() const {
   std::vector<std::vector<std::size_t>> graph(n());
-  for (const Contact<Scalar>& contact : contacts()) {
-    if (contact.second != staticPartner && contact.first < n() && contact.second < n()) {
-      graph[contact.first].push_back(contact.second);
-      graph[contact.second].push_back(contact.first);
-    }
-  }
-  for (const Impact<Scalar>& impact : impacts()) {
-    if (impact.second != staticPartner && impact.first < n() && impact.second < n()) {
-      std::vector<std::size_t>& partners = graph[impact.first];
-      if (std::find(partners.begin(), partners.end(), impact.second) == partners.end()) {
-        partners.push_back(impact.second);
-        graph[impact.second].push_back(impact.first);
+  auto touches = contact_.allTouches();
+  touches.keepPresent(bodies_);
+  for (const Contact<Scalar>& c : touches.contacts) {
+    if (c.second != staticPartner) {
+      std::vector<std::size_t>& partners = graph[c.first];
+      if (std::find(partners.begin(), partners.end(), c.second) == partners.end()) {
+        partners.push_back(c.second);
+        graph[c.second].push_back(c.first);
       }
     }
   }
@@ -142,7 +138,8 @@ void Space<Scalar, Layout>::logSystemEnergy(std::size_t iteration) {
     const ContactReport<Scalar>& report = contactReport();
     logLine(("gravel: step " + std::to_string(iteration) + " contacts " + std::to_string(contactCount()) +
              " sweeps " + std::to_string(report.iterations) + " residual " + text(report.residual) +
-             " virial residual " + text(contactVirial().residual()) + " weight residual " +
+             (contact_.domain.isOpen() ? " virial residual " + text(contactVirial().residual()) : "") +
+             " weight residual " +
              text(supportedWeight().residual()))
                 .c_str());
   }

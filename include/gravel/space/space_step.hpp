@@ -117,6 +117,7 @@ template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::prepare() {
   bodies_.validateAll();
   contact_.materials.check(bodies_);
+  contact_.checkSizes(bodies_);
   orbits_.check(this->config_.integrator, bodies_, contact_, force_);
   wakeTheChanged();
   contact_.setIdle(false);  // until fallAsleep() has looked at those that came or woke

@@ -86,6 +86,7 @@ class StepRecord {
   bool hasParts() const { return parts_ > 1; }
   /// In their order, with times since the start of the step. Of a step in one part there are none here.
   const std::vector<Impact<Scalar>>& impacts() const { return impacts_; }
+  std::vector<Impact<Scalar>>& impacts() { return impacts_; }
 
  private:
   static void join(ContactImpulse<Scalar>& sum, const ContactImpulse<Scalar>& part) {

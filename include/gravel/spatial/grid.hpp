@@ -27,11 +27,15 @@ class UniformGrid {
       low_ = low_.cwiseMin(positions[i]);
       high = high.cwiseMax(positions[i]);
     }
+    Vector3<S> extent = high - low_;
+    if (!isFinite(extent)) {  // beyond the scalar's range: one cell
+      extent.setZero();
+    }
     cell_ = cell;
     const auto cells = [&] {
       S product(1);
       for (int axis = 0; axis < 3; ++axis) {
-        product *= std::floor((high[axis] - low_[axis]) / cell_) + S(1);
+        product *= std::floor(extent[axis] / cell_) + S(1);
       }
       return product;
     };
@@ -39,7 +43,7 @@ class UniformGrid {
       cell_ *= S(1.25);
     }
     for (int axis = 0; axis < 3; ++axis) {
-      count_[axis] = static_cast<std::size_t>((high[axis] - low_[axis]) / cell_) + 1;
+      count_[axis] = static_cast<std::size_t>(extent[axis] / cell_) + 1;
     }
     start_.assign(count_[0] * count_[1] * count_[2] + 1, 0);
     cellOf_.resize(n);
