@@ -3,12 +3,12 @@
 
 #include <numbers>
 
-// Static friction of small structures. k balls in a ring, each touching its neighbours, carry one on top; the
-// line from a lower ball to it stands at theta from the vertical, sin theta = 1 / (2 sin(pi/k)). A lower ball
+// Static friction of small structures. k balls in a ring, in touch with their neighbours or with gaps between
+// them, carry one on top; the line from a lower ball to it stands at theta from the vertical. A lower ball
 // does not turn if the friction f at the floor and at the upper ball is the same, and does not move if
 //   N sin theta = f (1 + cos theta),   N cos theta + f sin theta = W/k,
-// so that f/N = tan(theta/2), N = W/k, and at the floor f/(W + W/k) = tan(theta/2)/(k + 1). The ring itself
-// touches without force.
+// so that f/N = tan(theta/2), N = W/k, and at the floor f/(w + W/k) = tan(theta/2) (W/k)/(w + W/k) for a
+// lower ball of weight w. The ring itself touches without force.
 
 using namespace gravel;
 using namespace gravel::test;
@@ -18,29 +18,45 @@ namespace {
 constexpr double g = 9.81;
 constexpr double radius = 0.5;
 
-/// How far the upper ball has come down after 3 s, over the radius.
-double sinking(int k, double amongBalls, double atFloor) {
+struct Ring {
+  int k;
+  double gap;   // over the radius of the lower balls
+  double top;   // radius of the upper ball, over the same
+  double mass;  // of the upper ball, over that of a lower one
+
+  double distance() const { return radius * (1 + gap / 2) / std::sin(std::numbers::pi / k); }
+  double amongBalls() const { return std::tan(std::asin(distance() / (radius * (1 + top))) / 2); }
+  double atFloor() const { return amongBalls() * (mass / k) / (1 + mass / k); }
+};
+
+/// How far the upper ball has come down after a time [s], over the radius.
+/// \param slide kinetic friction over static friction
+double sinking(const Ring& ring, double slide, double amongBalls, double atFloor, bool asked, double time) {
   SimulationConfig<double> config = plain(2e-3);
   config.coeffRestitution = 0;
-  config.coeffFriction = config.coeffStaticFriction = amongBalls;
-  config.contactTolerance = 1e-9;
-  config.contactIterations = 2000;
+  config.coeffStaticFriction = amongBalls;
+  config.coeffFriction = slide * amongBalls;
+  if (asked) {
+    config.contactTolerance = 1e-9;
+    config.contactIterations = 2000;
+  }
   Space<double> space(config);
   space.setUniformField({0, 0, -g});
   // The coefficient of a pair is the geometric mean.
-  const MaterialId floor = space.addMaterial({.restitution = 0,
-                                              .staticFriction = atFloor * atFloor / amongBalls,
-                                              .kineticFriction = atFloor * atFloor / amongBalls});
+  const double ofFloor = atFloor * atFloor / amongBalls;
+  const MaterialId floor =
+      space.addMaterial({.restitution = 0, .staticFriction = ofFloor, .kineticFriction = slide * ofFloor});
   space.addPlane({0, 0, 1}, 0, floor);
-  const double ring = radius / std::sin(std::numbers::pi / k);
-  for (int i = 0; i < k; ++i) {
-    const double angle = 2 * std::numbers::pi * i / k + 0.3;
-    space.addBody(ball({ring * std::cos(angle), ring * std::sin(angle), radius}, {0, 0, 0}, radius, 2.0));
+  const double d = ring.distance();
+  for (int i = 0; i < ring.k; ++i) {
+    const double angle = 2 * std::numbers::pi * i / ring.k + 0.3;
+    space.addBody(ball({d * std::cos(angle), d * std::sin(angle), radius}, {0, 0, 0}, radius, 2.0));
   }
-  const double top = radius + std::sqrt(4 * radius * radius - ring * ring);
-  space.addBody(ball({0, 0, top}, {0, 0, 0}, radius, 2.0));
-  space.advanceTo(3.0);
-  return (top - Vec(space.body(static_cast<std::size_t>(k)).position())[2]) / radius;
+  const double reach = radius * (1 + ring.top);
+  const double top = radius + std::sqrt(reach * reach - d * d);
+  space.addBody(ball({0, 0, top}, {0, 0, 0}, radius * ring.top, 2.0 * ring.mass));
+  space.advanceTo(time);
+  return (top - Vec(space.body(static_cast<std::size_t>(ring.k)).position())[2]) / radius;
 }
 
 }  // namespace
@@ -48,13 +64,26 @@ double sinking(int k, double amongBalls, double atFloor) {
 // Seen to fail: a static coefficient 2 % too large or too small in the rows of the solver.
 TEST_CASE("Balls in a ring carry one on top above the friction of the closed form, and part below it") {
   for (const int k : {3, 4}) {
-    const double theta = std::asin(1 / (2 * std::sin(std::numbers::pi / k)));
-    const double least = std::tan(theta / 2);
-    CAPTURE(k, least);
-    CHECK(std::abs(sinking(k, 1.01 * least, 1.0)) < 1e-6);
-    CHECK(sinking(k, 0.99 * least, 1.0) > 0.1);
-    const double leastAtFloor = least / (k + 1);
-    CHECK(std::abs(sinking(k, 1.0, 1.01 * leastAtFloor)) < 1e-6);
-    CHECK(sinking(k, 1.0, 0.99 * leastAtFloor) > 0.1);
+    const Ring ring{k, 0, 1, 1};
+    CAPTURE(k);
+    CHECK(std::abs(sinking(ring, 1, 1.01 * ring.amongBalls(), 1, true, 3)) < 1e-6);
+    CHECK(sinking(ring, 1, 0.99 * ring.amongBalls(), 1, true, 3) > 0.1);
+    CHECK(std::abs(sinking(ring, 1, 1, 1.01 * ring.atFloor(), true, 3)) < 1e-6);
+    CHECK(sinking(ring, 1, 1, 0.99 * ring.atFloor(), true, 3) > 0.1);
+  }
+}
+
+// With the default settings, whose sweeps end before forces are found in the first steps: what comes down on
+// the way is some g dt^2. Seen to fail: rows slide as soon as friction is cut in a sweep (1.27 times as much
+// friction needed at the floor of the ring of six with 3/4, 1.02 among its balls).
+TEST_CASE("It is static friction that holds a structure, however little it has once it slides") {
+  for (const Ring& ring : {Ring{3, 0, 1, 1}, Ring{4, 0.125, 2.25, 0.5}, Ring{6, 0.033, 2, 0.2}}) {
+    for (const double slide : {0.75, 0.5}) {
+      CAPTURE(ring.k, slide);
+      CHECK(std::abs(sinking(ring, slide, 1.01 * ring.amongBalls(), 2, false, 1)) < 1e-4);
+      CHECK(sinking(ring, slide, 0.99 * ring.amongBalls(), 2, false, 1) > 0.01);
+      CHECK(std::abs(sinking(ring, slide, 2, 1.01 * ring.atFloor(), false, 1)) < 1e-4);
+      CHECK(sinking(ring, slide, 2, 0.99 * ring.atFloor(), false, 1) > 0.01);
+    }
   }
 }

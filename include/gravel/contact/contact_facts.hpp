@@ -17,6 +17,7 @@ namespace gravel {
 /// What occurs among the contacts of a step.
 struct ContactKinds {
   bool rub = false;     ///< friction
+  bool grip = false;    ///< more of it at rest than in a slide
   bool turn = false;    ///< resistance to rolling or spinning
   bool spring = false;  ///< tangential restitution
   bool drift = false;   ///< a second side that moves on by itself
@@ -24,12 +25,14 @@ struct ContactKinds {
   template <Real S>
   void include(const ContactSurface<S>& surface) {
     rub = rub || surface.material.staticFriction > S(0);
+    grip = grip || surface.material.staticFriction > surface.material.kineticFriction;
     turn = turn || surface.material.rollingFriction > S(0) || surface.material.spinningFriction > S(0);
     spring = spring || surface.material.tangentialRestitution > S(0);
     drift = drift || !(surface.drift == Vector3<S>::Zero());
   }
   ContactKinds& operator+=(const ContactKinds& other) {
     rub = rub || other.rub;
+    grip = grip || other.grip;
     turn = turn || other.turn;
     spring = spring || other.spring;
     drift = drift || other.drift;

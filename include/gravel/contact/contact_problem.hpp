@@ -43,7 +43,9 @@ class ContactProblem : public detail::ProblemBodies<S> {
   std::vector<Vector3<S>> slipTargets;  ///< slip after a blow that sticks, by row; empty if zero for all
   std::vector<detail::TurningRow<S>> turning;  ///< by row; empty if nothing resists rolling or spinning
   bool drifting = false;                       ///< any contact whose second side drifts
-  bool active = false;                         ///< any contact that approaches faster than it may
+  bool grips = false;                          ///< any contact with more friction at rest than in a slide
+  bool atOnce = false;       ///< rows slide as soon as friction is cut: there is no time to ask
+  bool active = false;       ///< any contact that approaches faster than it may
   S largestApproach = S(0);  ///< largest change of a normal velocity that a contact asks for
   S wrong_sq = S(0);  ///< if `again`, the largest change of a velocity that a sweep would make, squared
   /// If `again`, rows at rest between bodies that begin as they did were passed over: isPassed().
@@ -54,8 +56,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
   /// Takes up bodies and contacts, and the first guess of the impulses with what it does to the bodies.
   /// \param dt [s] step that these contacts stand for, >= 0
   /// \param impulses of this problem, to be, by row; as many as there are contacts, of any value. May be
-  /// `last`
-  ///        itself, but for sweeps with momentum
+  ///        `last` itself, but for sweeps with momentum
   /// \param last impulses of the last solve by row, zero for those that are new
   /// \param ratio of forces that last: the guess is `ratio` times `last`; 0 for none
   /// \param fresh contacts are others, or elsewhere, than at the last call
@@ -137,13 +138,9 @@ class ContactProblem : public detail::ProblemBodies<S> {
     cutToCone(row, b1, b2);
   }
 
-  /// The square of the change that a sweep would make in velocities, at most. Resistance to turning left out.
-  [[gnu::always_inline]] inline Pack wrongAt(const Group& group, const Lanes& present) const {
-    Lanes row = present;
-    return change(group, row, detail::BodyLanes<S>::load(bodies, group.slot1),
-                  detail::BodyLanes<S>::load(bodies, group.slot2))
-        .change_sq();
-  }
+  /// The square of the change that a sweep would make in velocities, at most; no bound, where it is still to
+  /// be asked who slides. Resistance to turning left out.
+  [[gnu::always_inline]] inline Pack wrongAt(const Group& group, const Lanes& present) const;
 
   /// Makes these rows right while all others stand. The normal impulse leaves the slip as it is, so that both
   /// are found from the same velocities.
@@ -155,7 +152,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
     const Pack v_n = row.n.dot(v_rel);
     pushRight(row, b1, b2, v_n, changes);
     if (friction) {
-      rubRight(row, b1, b2, slipOf(group, slipVelocity(row, v_rel, v_n, b1, b2)), tired(group), changes);
+      rubRight(row, b1, b2, slipOf(group, slipVelocity(row, v_rel, v_n, b1, b2)), slidesOf(group), changes);
     } else {
       changes.rubs = changes.slides = Pack::zero() > Pack::zero();
     }
@@ -168,10 +165,12 @@ class ContactProblem : public detail::ProblemBodies<S> {
     return slipTargets.empty() ? slip : slip - vectorsOf(group, slipTargets);
   }
 
-  [[gnu::always_inline]] inline typename Pack::Truth tired(const Group& group) const {
-    const Pack limit = Pack::all(S(detail::RowMark::patience));
-    return !(Pack::of([&](std::size_t lane) { return S(marks[group.row[lane]].slides); }) < limit);
-  }
+  /// Where static and kinetic friction are one, it does not matter who slides.
+  [[gnu::always_inline]] inline detail::RowSlides<S> slidesOf(const Group& group) const;
+
+  /// Sweeps went on with static friction where it was not known who slides: those whose friction is at its
+  /// limit, and whose slip exceeds `least`, do, and are to be looked at again. \return whether there are any
+  bool letSlide(const ContactColoring& colouring, const S& least);
 
  private:
   /// What rows are taken up from.
@@ -291,10 +290,11 @@ class ContactProblem : public detail::ProblemBodies<S> {
   void aimSlip(const Taking<B>& taking, const Group& group, std::size_t lane, const Lanes& rowLanes,
                const S& drift_n, const Vector3<S>& turned);
 
-  /// Begins with the first guess of rows whose bodies have it already.
+  /// What slid in the last solve slides: its friction was at the kinetic limit.
+  [[gnu::always_inline]] inline void recallSlides(const Group& group, const Lanes& row);
+  bool slid(std::size_t k, const S& kineticFriction) const;
+  /// Begin with the first guess of rows: whose bodies have it already, or get it.
   [[gnu::always_inline]] inline void repeat(const Group& group, Lanes& row);
-
-  /// Begins with the first guess of rows.
   [[gnu::always_inline]] inline void guess(const Group& group, Lanes& row);
 
   /// Rows that were taken up, and their impulses.
@@ -315,4 +315,5 @@ class ContactProblem : public detail::ProblemBodies<S> {
 }  // namespace gravel
 
 #include <gravel/contact/contact_problem_again.hpp>
+#include <gravel/contact/contact_problem_slides.hpp>
 #include <gravel/contact/contact_problem_take.hpp>

@@ -7,7 +7,7 @@
 /// A row that is right stays so while its bodies begin where they began and their impulses stay: how far both
 /// may have moved since is half of what ended the sweeps, and counts the change of where they begin. What a
 /// row asks for must not depend on velocities, so that those with restitution are looked at, those that turn,
-/// and those whose load has gone.
+/// those that slide, and those whose load has gone.
 
 #include <gravel/contact/contact_problem.hpp>
 
@@ -17,7 +17,7 @@ template <Real S>
 bool ContactProblem<S>::isPassed(std::size_t k, const ContactColoring& colouring) const {
   const ContactColoring::Row& place = colouring.rows()[k];
   return (rests_[k] == RowRest::Free || (rests_[k] == RowRest::Loaded && last_->normal(k) > S(0))) &&
-         !watch.isStale(k, place.slot1, place.slot2);
+         !watch.isStale(k, place.slot1, place.slot2) && !(grips && slid(k, rows[k].slide));
 }
 
 template <Real S>
@@ -26,6 +26,18 @@ void ContactProblem<S>::recall(const ContactColoring& colouring) {
     detail::forGroupsOf<S>(
         colouring, begin, end, [&](std::size_t k) { return !marks[k].taken; },
         [&](const Group& group) { storeImpulses(group, load(group, false)); });
+  });
+}
+
+template <Real S>
+template <class B>
+void ContactProblem<S>::fillAll(const Taking<B>& taking) {
+  forGroups(taking.colouring, taking.colouring.loneCount(), rows.size(), [&](const Group& group) {
+    const Pack radius1 = detail::BodyLanes<S>::load(initial, group.slot1).spin;
+    const Pack radius2 = detail::BodyLanes<S>::load(initial, group.slot2).spin;
+    Lanes row = rowsOf(taking, group, radius1, radius2);
+    row.target = Lanes::load(rows, group).target;
+    row.store(rows, group);
   });
 }
 

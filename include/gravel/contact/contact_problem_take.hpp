@@ -16,6 +16,8 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
                                detail::ImpulseList<S>& impulses, const detail::ImpulseList<S>& last,
                                const S& ratio, bool fresh, bool goesOn, bool drifts) {
   friction = kinds.rub || kinds.turn;
+  grips = kinds.grip;
+  atOnce = settings.maxIterations < 2;
   drifting = kinds.drift;
   again = goesOn;
   gatherBodies(source, colouring, ratio);
@@ -115,18 +117,6 @@ inline auto ContactProblem<S>::take(const Taking<B>& taking, const Group& group,
   }
   most += Most{aim(taking, group, row, b1, b2)};
   return row;
-}
-
-template <Real S>
-template <class B>
-void ContactProblem<S>::fillAll(const Taking<B>& taking) {
-  forGroups(taking.colouring, taking.colouring.loneCount(), rows.size(), [&](const Group& group) {
-    const Pack radius1 = detail::BodyLanes<S>::load(initial, group.slot1).spin;
-    const Pack radius2 = detail::BodyLanes<S>::load(initial, group.slot2).spin;
-    Lanes row = rowsOf(taking, group, radius1, radius2);
-    row.target = Lanes::load(rows, group).target;
-    row.store(rows, group);
-  });
 }
 
 template <Real S>
@@ -290,6 +280,7 @@ void ContactProblem<S>::aimSlip(const Taking<B>& taking, const Group& group, std
 
 template <Real S>
 inline void ContactProblem<S>::repeat(const Group& group, Lanes& row) {
+  recallSlides(group, row);
   takeGuess(group, row, detail::BodyLanes<S>::load(bodies, group.slot1),
             detail::BodyLanes<S>::load(bodies, group.slot2));
   for (std::size_t lane = 0; lane < group.count && !turning.empty(); ++lane) {
@@ -299,6 +290,7 @@ inline void ContactProblem<S>::repeat(const Group& group, Lanes& row) {
 
 template <Real S>
 inline void ContactProblem<S>::guess(const Group& group, Lanes& row) {
+  recallSlides(group, row);
   auto b1 = detail::BodyLanes<S>::load(bodies, group.slot1);
   auto b2 = detail::BodyLanes<S>::load(bodies, group.slot2);
   takeGuess(group, row, b1, b2);

@@ -30,16 +30,19 @@ struct RowImpulses {
     }
   };
 
-  /// Takes down which rows slide now.
+  /// Takes down which rows are at the limit of friction now. \param atOnce  that is to slide
   [[gnu::always_inline]] static inline void mark(ContactProblem<S>& problem, const Group& group,
-                                                 const RowChanges<S>& changes) {
+                                                 const RowChanges<S>& changes, bool atOnce) {
     for (std::size_t lane = 0; lane < group.count; ++lane) {
-      RowMark& row = problem.marks[group.row[lane]];
-      const bool slides = changes.slides[lane];
-      if (slides && !row.sliding && row.slides < RowMark::patience) {
-        ++row.slides;
+      if (changes.rubs[lane]) {
+        RowMark& row = problem.marks[group.row[lane]];
+        const bool cut = changes.slides[lane];
+        if (atOnce && cut && !row.atLimit && row.slides < RowMark::patience) {
+          ++row.slides;
+        }
+        row.atLimit = cut;
+        row.kinetic = row.kinetic && (cut || row.slides >= RowMark::patience);
       }
-      row.sliding = changes.rubs[lane] ? slides : row.sliding;
     }
   }
 
@@ -51,9 +54,11 @@ struct RowImpulses {
     auto b2 = BodyLanes<S>::load(problem.bodies, group.slot2);
     const PackedVector<S> v_rel = b2.v - b1.v;
     RowChanges<S> changes;
+    const typename Packed<S>::Truth no = Packed<S>::zero() > Packed<S>::zero();
+    const bool tired = problem.marks[k].slides >= RowMark::patience;
     rubRight(row, b1, b2, problem.slipOf(group, slipVelocity(row, v_rel, row.n.dot(v_rel), b1, b2)),
-             problem.tired(group), changes);
-    mark(problem, group, changes);
+             RowSlides<S>{!no, tired ? !no : no}, changes);
+    mark(problem, group, changes, true);
     push(b1, b2, changes.dt);
     twist(row, b1, b2, changes.dt);
     problem.storeImpulses(group, row);

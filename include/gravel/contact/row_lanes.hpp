@@ -180,24 +180,31 @@ template <Real S>
   row.jn = jn;
 }
 
-/// The tangential impulse of `row` becomes right for its normal one.
-/// \param slip that is to vanish \param tired  rows that have changed their mind between sticking and sliding
-/// too often: they slide, since sweeps must end
+/// Which rows of a group slide.
+template <Real S>
+struct RowSlides {
+  typename Packed<S>::Truth kinetic;  ///< what cuts friction is the kinetic limit; in others the static one
+  typename Packed<S>::Truth tired;    ///< that have begun to too often: they go on, since sweeps must end
+};
+
+/// The tangential impulse of `row` becomes right for its normal one: a row sticks up to the static limit.
+/// \param slip that is to vanish
 template <Real S>
 [[gnu::always_inline]] inline void rubRight(RowLanes<S>& row, const BodyLanes<S>& b1, const BodyLanes<S>& b2,
-                                            const PackedVector<S>& slip,
-                                            const typename Packed<S>::Truth& tired, RowChanges<S>& changes) {
+                                            const PackedVector<S>& slip, const RowSlides<S>& sliding,
+                                            RowChanges<S>& changes) {
   using P = Packed<S>;
   const P zero = P::zero();
   const P mobility = tangentialMobility(row, b1, b2);
   const PackedVector<S> wanted = row.jt - reciprocalOf(mobility) * slip;
   const P size_sq = wanted.squaredNorm();
-  const P most = choose(tired, row.slide, row.stick) * row.jn;
+  const P most = choose(sliding.tired, row.slide, row.stick) * row.jn;
   changes.rubs = (row.stick > zero) & (mobility > zero) & ((row.jn > zero) | (row.jt.sumAbs() > zero));
   changes.slides = changes.rubs & (size_sq > most * most);
   PackedVector<S> jt = choose(changes.rubs, wanted, row.jt);
   if (changes.slides.any()) {
-    const P kept = row.slide * row.jn / squareRoot(choose(changes.slides, size_sq, P::all(S(1))));
+    const P limit = choose(sliding.kinetic, row.slide, row.stick);
+    const P kept = limit * row.jn / squareRoot(choose(changes.slides, size_sq, P::all(S(1))));
     jt = choose(changes.slides, kept * wanted, jt);
   }
   changes.dt = jt - row.jt;
@@ -213,7 +220,8 @@ template <Real S>
   const PackedVector<S> none = PackedVector<S>::zero();
   row.jt = choose(row.jn > P::zero(), row.jt - row.n.dot(row.jt) * row.n, none);
   RowChanges<S> changes;
-  rubRight(row, b1, b2, none, typename P::Truth(P::zero() > P::zero()), changes);
+  const typename P::Truth no = P::zero() > P::zero();
+  rubRight(row, b1, b2, none, RowSlides<S>{!no, no}, changes);
   row.jt = choose(changes.rubs, row.jt, none);
 }
 

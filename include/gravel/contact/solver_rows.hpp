@@ -108,9 +108,10 @@ struct alignas(rowAlignment<S>) SolverRow {
 /// What sweeps keep of a row besides.
 struct RowMark {
   bool impact = false;
-  bool taken = false;  ///< its impulse is in the list of this problem; if not, it is that of the last one
-  bool sliding = false;
-  std::uint8_t slides = 0;  ///< how often it went from sticking to sliding, `patience` at most
+  bool taken = false;    ///< its impulse is in the list of this problem; if not, it is that of the last one
+  bool atLimit = false;  ///< its friction was cut when last looked at
+  bool kinetic = false;  ///< it slides: what cuts it is kinetic friction
+  std::uint8_t slides = 0;  ///< how often it began to slide, `patience` at most: then it goes on
   static constexpr std::uint8_t patience = 8;
 };
 

@@ -34,6 +34,10 @@ inline int threadCount() {
 
 namespace detail {
 
+/// Less than that many chunks of some microseconds stay on one thread: they would gain little from others,
+/// and wait for them where cores have other work, which takes a hundred times as long.
+inline constexpr std::size_t fewTasks = 8;
+
 /// Keeps the exception of the lowest chunk that threw.
 class FirstError {
  public:
@@ -154,7 +158,7 @@ enum class Share {
 /// lowest c among them comes out; which of the later calls were still made is not fixed.
 template <Share share = Share::AsFree, class F>
 void parallelForTasks(std::size_t count, F&& f) {
-  if (count <= 1 || threadCount() == 1) {
+  if (count < (share == Share::Alike ? detail::fewTasks : 2) || threadCount() == 1) {
     for (std::size_t c = 0; c < count; ++c) {
       f(c);
     }
