@@ -18,7 +18,7 @@ struct Body {
   Vector3<Scalar> angularVelocity = Vector3<Scalar>::Zero();        ///< [rad s^-1], axes of space
   Quaternion<Scalar> orientation = Quaternion<Scalar>::Identity();  ///< normalised when added
   Scalar mass = Scalar(1);          ///< [kg] >= 0; 0 only for a point (radius 0) or a fixed body
-  Scalar radius = Scalar(0);        ///< [m] >= 0; a body of radius 0 touches nothing of radius 0
+  Scalar radius = Scalar(0);        ///< [m] >= 0; one of radius 0 touches spheres alone: no point, no plane
   bool fixed = false;               ///< never moves, nor turns, whatever its velocities; its mass still pulls
   std::optional<Scalar> inertia{};  ///< [kg m^2] > 0; without it a homogeneous sphere's 2/5 m r^2
   MaterialId material = defaultMaterial;

@@ -18,9 +18,8 @@ class BoundaryList {
  public:
   /// O(near bodies); O(bodies x boundaries) when it searches: where `stale`, or a boundary is another one or
   /// has moved by more than its part of the skin.
-  /// \param stale some body may have moved by more than skin/2 since the last call with `stale`, or indices
-  /// or
-  ///        radii changed
+  /// \param stale  some body may have moved by more than skin/2 since the last call with `stale`, or indices
+  ///   or radii changed
   /// \param skin [m] by which gaps of bodies may shrink until then
   /// \param margin [m] of gaps, the same until then
   /// \param h [s] for which boundaries move on at their velocities, and the list is to hold

@@ -23,7 +23,8 @@ struct ContactOutcomes {
 };
 
 /// Asks `hook` about each contact of two bodies that approach faster than what rests picks up in a step,
-/// `threshold` + 2 |a_rel.n| h, and gives them the velocities of its outcome. O(contacts), one thread.
+/// `threshold` + 2 |a_rel.n| h, and gives them the velocities of its outcome. O(contacts x decided), one
+/// thread.
 /// \param decided pairs of ids about which it was asked in this step already
 template <Real S, ContactBodies B>
 ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, const CollisionHook<S>& hook,

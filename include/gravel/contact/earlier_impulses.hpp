@@ -23,8 +23,9 @@ inline void findRows(std::span<const ContactColoring::Row> rows, std::vector<std
 template <Real S>
 class EarlierImpulses {
  public:
-  /// Takes what contacts have got; leaves in its place what was here before, which is of no use. \param names
-  /// of the contacts, sorted \param impulses in the order of `rows`; in that of contacts without rows
+  /// Takes what contacts have got; leaves in its place what was here before, which is of no use.
+  /// \param names  of the contacts, sorted
+  /// \param impulses  in the order of `rows`; without rows, in that of the contacts
   void take(std::vector<ContactName>& names, ImpulseList<S>& impulses,
             std::span<const ContactColoring::Row> rows) {
     std::swap(impulses_, impulses);

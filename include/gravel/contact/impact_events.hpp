@@ -53,13 +53,13 @@ class ImpactEvents : private detail::ImpactForecast<S> {
 
   /// Between the kick and the drift: changes positions, velocities and spins so that the drift ends where the
   /// bodies are after all impacts.
-  /// \param near  `pairs()`: candidates sorted by ids, every pair that may touch in the step; `version()`: a
-  /// number that changes with them, 0 if unknown; `follow(bodies, i, h, out)` appends those that a new course
-  /// of body i adds \param held contacts that are solved otherwise, sorted by keys \param nearWalls indices
-  /// of the bodies that may touch a boundary in the step; all without it
-  /// \param decide  asked about each impact of two bodies that is faster than what rests: `decide(impact,
-  /// material, v1, v2, v_rel)` with the velocities of the moment gives a `CollisionOutcome`. Two that shall
-  /// merge fly on through each other for the rest of the step.
+  /// \param near  `pairs()`: all that may touch in the step, sorted by ids; `version()`: changes with them, 0
+  ///   if unknown; `follow(bodies, i, h, out)`: appends those that a new course of body i adds
+  /// \param held  contacts that are solved otherwise, sorted by keys
+  /// \param nearWalls  indices of the bodies that may touch a boundary in the step; all without it
+  /// \param decide  `decide(impact, material, v1, v2, v_rel)`, asked about each impact of two bodies that is
+  ///   faster than what rests, with the velocities of the moment: a `CollisionOutcome`. Two that shall merge
+  ///   fly on through each other for the rest of the step.
   /// \param support  of bodies that are held: see detail::ImpactScene
   template <ContactBodies B, class Candidates, class Course = StraightCourse<S>, class Decide = NoDecision,
             class Support = NoSupport>

@@ -15,6 +15,7 @@
 
 namespace gravel {
 
+/// How overlap is removed. A `Space` takes a factor of its own, 0.4 by default.
 template <Real Scalar>
 struct CorrectionSettings {
   Scalar factor = Scalar(0.8);  ///< [1], 0 … 1: part of each overlap to remove

@@ -39,7 +39,8 @@ template <Real S>
 struct RestingGap {
   using P = Packed<S>;
 
-  /// [m s^-1] >= 0 \param gap [m] < 0 is overlap \param radii [m] their sum
+  /// [m s^-1] >= 0
+  /// \param gap [m] < 0 is overlap \param radii [m] their sum
   /// \param accelerations |a_1| + |a_2| of the two [m s^-2] \param dt [s]
   [[gnu::always_inline]] static inline P allowedApproach(const P& gap, const P& radii, const P& accelerations,
                                                          const S& dt) {

@@ -35,8 +35,11 @@ struct TurningPair {
   typename P::Truth counts;  ///< it is more than a little of what the step's fall brings
 
   /// In the units of the problem's speeds, 2^exponent of SI ones.
-  /// \param pair  lanes of two spheres \param distance [m] D > 0 \param v_t_sq,w as above, w zero without
-  /// friction \param falls [m s^-2] |a_1| + |a_2| \param h [s]
+  /// \param pair  lanes of two spheres
+  /// \param distance  D > 0 [m]
+  /// \param v_t_sq,w  as above; w is zero without friction
+  /// \param falls  |a_1| + |a_2| [m s^-2]
+  /// \param h [s]
   [[gnu::always_inline]] static inline TurningPair of(const typename P::Truth& pair, const V& n,
                                                       const P& distance, const P& v_t_sq, const V& w,
                                                       const P& falls, const S& h, int exponent) {

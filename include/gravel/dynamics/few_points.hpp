@@ -13,7 +13,7 @@ namespace gravel {
 /// Positions, velocities and accelerations of at most `most` movable bodies, coefficient by coefficient in
 /// one row each, with what sums lost to rounding. Kicks and drifts give the bits of `integrate()` on the
 /// bodies themselves: the same operations, but without asking at each whether somebody else wrote to a body.
-/// Bodies do not turn. 1.3 kB in double; no memory is asked for.
+/// Bodies do not turn. 1.8 kB in double; no memory is asked for.
 template <Real Scalar>
 class FewPoints {
  public:

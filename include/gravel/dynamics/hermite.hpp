@@ -20,13 +20,12 @@ namespace gravel {
 /// rounded down to a power of two; it is doubled at most, and only where blocks of the double length begin.
 /// At the end of h all bodies are at the same time.
 ///
-/// The forces are an object with
-///   begin(x, m, sources)        columns of places [m] and masses [kg]: rows with mass first, `sources` of
-///   them evaluate(rows, x, v, a, j)  sets a [m s^-2] and j [m s^-3] of these rows, with all rows below
-///   `sources`
-///                               and these rows at x and v
-///   rates(rows, x, v, rate_sq)  about 1/t^2 [s^-2] of these rows, t the time in which their motion changes
-/// as JerkSum is. A uniform field is given apart: it changes no step.
+/// The forces are an object, as JerkSum is, with
+/// - begin(x, m, sources): columns of places [m] and masses [kg], whose first `sources` rows have mass;
+/// - evaluate(rows, x, v, a, j): sets a [m s^-2] and j [m s^-3] of these rows, with these and all sources
+///   at x and v;
+/// - rates(rows, x, v, rate_sq): about 1/t^2 [s^-2] of these rows, t the time in which their motion changes.
+/// A uniform field is given apart: it changes no step.
 ///
 /// Cost: an evaluation of the bodies that move and O(N) a block step. Not symplectic and not reversible: the
 /// energy drifts, by 2e-8 in half a time unit of a star cluster, 6e-6 an orbit of e = 0.9 at the default eta.
@@ -35,7 +34,8 @@ namespace gravel {
 template <Real Scalar>
 class Hermite4 {
  public:
-  /// Advances by h [s]. \param field [m s^-2], acts on movable bodies
+  /// Advances by h [s].
+  /// \param field [m s^-2], acts on movable bodies
   /// \param arrival  called once, when bodies stand at their end; sets their accelerations there, by which a
   ///   change from outside is noticed before the next step
   template <class Layout, class Forces, class Arrival>

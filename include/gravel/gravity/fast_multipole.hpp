@@ -63,8 +63,8 @@ class FastMultipole {
   }
 
   /// As accelerations(), with the same bits, but out[i] is found for these numbers i only, and the others
-  /// are left as they are. The tree and its moments cost what they cost for all. \throws
-  /// std::invalid_argument for a number that no body has, besides
+  /// are left as they are. The tree and its moments cost what they cost for all.
+  /// \throws std::invalid_argument as accelerations(), and for a number that no body has
   template <class Numbers, class Positions, class Masses, class Accelerations>
   void accelerationsOf(const Numbers& numbers, const Positions& positions, const Masses& masses, const S& G,
                        const S& softening, Accelerations&& out) {

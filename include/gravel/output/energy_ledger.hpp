@@ -15,12 +15,14 @@ template <Real Scalar>
 struct EnergyLedger {
   Scalar kinetic = Scalar(0);      ///< sum m v^2 / 2
   Scalar rotational = Scalar(0);   ///< sum I w^2 / 2
-  Scalar potential = Scalar(0);    ///< mutual gravity and the uniform field
+  Scalar potential = Scalar(0);    ///< mutual gravity, the uniform field, and the frame of a patch
   Scalar restitution = Scalar(0);  ///< taken by normal impulses
   Scalar friction = Scalar(0);     ///< taken by tangential impulses
   Scalar damping = Scalar(0);      ///< taken by linear and angular damping
   Scalar correction = Scalar(0);   ///< taken by positional correction; mostly negative: it lifts bodies
-  Scalar work = Scalar(0);         ///< minus the work of the user's own force
+  /// Minus the work of the user's own force, of planes that move, and of a domain at its edges: of the shear
+  /// of a patch, and of a uniform field where bodies come in again on the other side.
+  Scalar work = Scalar(0);
   Scalar exchange =
       Scalar(0);  ///< left with removed bodies (minus: came with new ones) and with changed settings
 

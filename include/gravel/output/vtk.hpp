@@ -220,7 +220,10 @@ VtkPoints vtkPoints(const Bodies& bodies) {
 }
 
 /// A run of frames: `<name>_000000.vtp`, … and `<name>.pvd`, which is written anew after each frame so that
-/// it can be opened while the run goes on. Open the `.pvd`; glyph by `radius` (diameter = 2 radius).
+/// it can be opened while the run goes on. Open the `.pvd`; glyph by `radius` (diameter = 2 radius). A series
+/// begins with frame 0 and an empty list: where one of this name is in the folder already, as after a
+/// restart, its frames are written over from 0 on, and the `.pvd` knows the new ones only. Take another name
+/// or folder.
 class VtkSeries {
  public:
   /// Makes the folder if it is not there. \throws std::runtime_error if that fails

@@ -146,7 +146,8 @@ class Space : public Settings<Scalar> {
 
   // What can be seen.
 
-  /// (translational, rotational, potential) [J]; the potential counts mutual gravity and the uniform field.
+  /// (translational, rotational, potential) [J]; the potential counts mutual gravity, the uniform field
+  /// and, in a shear-periodic domain, that of the frame.
   std::tuple<Scalar, Scalar, Scalar> calculateSystemEnergy() const;
   /// Energies now and what left since the start, by process.
   EnergyLedger<Scalar> energyLedger() const;

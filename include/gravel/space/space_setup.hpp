@@ -24,8 +24,9 @@ template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::initializeBodies(std::size_t n, Scalar dens, unsigned int seed) {
   using std::sqrt;
   bodies_.reserve(bodies_.size() + n);
-  // A tenth of the escape speed from a ball of that density, whose radius is about 2 m cbrt(n): bound, but
-  // not at rest. 0.1 m/s without gravity.
+  // A tenth of the escape speed from a ball of 2 m cbrt(n) of which an eighth is filled, which is about an
+  // eighth of that from the surface of the bodies as they lie (0.121 for many, 0.13 to 0.14 for n = 100):
+  // bound, but not at rest. 0.1 m/s without gravity.
   const Scalar radius = Scalar(2) * Scalar(std::cbrt(static_cast<double>(n)));
   const Scalar speed = getG() == Scalar(0)
                            ? Scalar(0.1)

@@ -28,9 +28,8 @@ struct BroadPhaseMethods<S, true> {
 
 }  // namespace detail
 
-/// Finds the pairs of bodies that touch or nearly touch. To add a method: one header with its `findPairs`,
-/// one
-/// line in the variant, one name in the enumeration and in `findPairs`.
+/// Finds the pairs of bodies that touch or nearly touch. To add a method: one header with its `findPairs`, a
+/// line in the variant, a name in the enumeration, in `name()` and in `search`.
 template <Real S>
 class BroadPhase {
  public:
@@ -46,9 +45,9 @@ class BroadPhase {
   }
 
   /// Every pair with |r_ij| < r_i + r_j + margin, sorted by ids, where |r_ij| is that of the nearest image
-  /// and two points (radius 0) are never a pair. The same list for every method and number of threads. \param
-  /// margin [m] >= 0 \throws std::invalid_argument for positions or radii that are not finite, negative radii
-  /// or margin
+  /// and two points (radius 0) are never a pair. The same list for every method and number of threads.
+  /// \param margin [m] >= 0
+  /// \throws std::invalid_argument for positions or radii that are not finite, negative radii or margin
   template <class Positions, class Radii, class Ids>
   void findPairs(const Positions& positions, const Radii& radii, const Ids& ids, const S& margin,
                  const Domain<S>& domain, const S& time, std::vector<Pair>& out) {

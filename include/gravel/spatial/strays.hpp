@@ -22,8 +22,9 @@ struct Wandering {
   bool lost = false;  ///< one is at no finite place
   std::vector<std::uint32_t> swift;
 
-  /// For bodies [begin, end). \param farthest(i) squared distance, NaN where a place is  \param same(i)
-  /// whether the radius is what it was
+  /// For bodies [begin, end).
+  /// \param farthest  farthest(i): squared distance [m^2], NaN where a coordinate is
+  /// \param same  same(i): whether the radius is what it was
   template <class Farthest, class Same>
   void look(std::size_t begin, std::size_t end, const S& within_sq, Farthest&& farthest, Same&& same) {
     moved_sq = most_sq = S(0);
