@@ -63,11 +63,11 @@ class ContactProblem : public detail::ProblemBodies<S> {
   /// \param goesOn the contacts of the last problem, where they were, and `last` is its solution: the guess
   ///        does to velocities what that did, `ratio` times, so that no contact needs to be asked; bodies
   ///        whose masses have changed are guarded against
-  /// \param drifts bodies go on straight for dt: see TurningPair
   template <ContactBodies B>
   void gather(const ContactView<S>& contacts, const B& source, const ContactColoring& colouring, const S& dt,
               const ContactSettings<S>& settings, const ContactKinds& kinds, detail::ImpulseList<S>& impulses,
-              const detail::ImpulseList<S>& last, const S& ratio, bool fresh, bool goesOn, bool drifts);
+              const detail::ImpulseList<S>& last, const S& ratio, bool fresh, bool goesOn,
+              const WayAhead<S>& way);
 
   /// Calls f(group) for rows [begin, end), which share no movable body; brings what later ones need nearer.
   template <class F>
@@ -182,7 +182,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
     const S& dt;
     const ContactSettings<S>& settings;
     bool fresh;
-    bool drifts;
+    const WayAhead<S>& way;
   };
 
   /// The largest change that a contact asks for, the largest that a sweep would make, squared, and for how
@@ -204,22 +204,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
 
   /// Takes up those rows but the lone ones of which `wanted(k, most)`, without a guess: their bodies have it.
   template <class B, class Wanted>
-  Most lookAtRows(const Taking<B>& taking, Wanted&& wanted) {
-    const ContactColoring& colouring = taking.colouring;
-    return detail::sumOverAllParts(colouring, Most{}, [&](std::size_t begin, std::size_t end, Most& part) {
-      if (begin < colouring.loneCount()) {
-        return;
-      }
-      detail::forGroupsOf<S>(
-          colouring, begin, end, [&](std::size_t k) { return wanted(k, part); },
-          [&](const Group& group) {
-            Lanes row = take(taking, group, part);
-            repeat(group, row);
-            put(group, row);
-            part += Most{S(0), wrongAt(group, row).largest(), group.count};
-          });
-    });
-  }
+  Most lookAtRows(const Taking<B>& taking, Wanted&& wanted);
 
   /// By row, in the rows of a group.
   static detail::PackedVector<S> vectorsOf(const Group& group, const std::vector<Vector3<S>>& all) {
@@ -264,6 +249,18 @@ class ContactProblem : public detail::ProblemBodies<S> {
   template <class B>
   [[gnu::always_inline]] inline S aim(const Taking<B>& taking, const Group& group, Lanes& row,
                                       const detail::BodyLanes<S>& b1, const detail::BodyLanes<S>& b2);
+
+  /// Half of what the bend of their ways does to the velocities of pairs until the end of the step.
+  template <class B>
+  [[gnu::always_inline]] inline detail::PackedVector<S> bendOf(const Taking<B>& taking,
+                                                               const Group& group) const;
+
+  /// What that does to slips. \param bend of bendOf()
+  template <class B>
+  [[gnu::always_inline]] inline detail::PackedVector<S> slipByBend(const Taking<B>& taking, const Lanes& row,
+                                                                   const detail::PackedVector<S>& bend,
+                                                                   const detail::BodyLanes<S>& b1,
+                                                                   const detail::BodyLanes<S>& b2) const;
 
   /// Drifts of second sides.
   template <class B>
@@ -317,3 +314,4 @@ class ContactProblem : public detail::ProblemBodies<S> {
 #include <gravel/contact/contact_problem_again.hpp>
 #include <gravel/contact/contact_problem_slides.hpp>
 #include <gravel/contact/contact_problem_take.hpp>
+#include <gravel/contact/contact_problem_way.hpp>

@@ -58,7 +58,9 @@ bool ContactProblem<S>::letSlide(const ContactColoring& colouring, const S& leas
       detail::RowMark& mark = marks[k];
       if (mark.taken && mark.atLimit && !mark.kinetic && rows[k].stick > rows[k].slide && slips(k)) {
         mark.kinetic = true;
-        mark.slides += mark.slides < detail::RowMark::patience ? 1 : 0;
+        if (mark.slides < detail::RowMark::patience) {
+          ++mark.slides;
+        }
         watch.enterFirst(k, false);
         ++count;
       }

@@ -14,12 +14,13 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
                                const ContactColoring& colouring, const S& dt,
                                const ContactSettings<S>& settings, const ContactKinds& kinds,
                                detail::ImpulseList<S>& impulses, const detail::ImpulseList<S>& last,
-                               const S& ratio, bool fresh, bool goesOn, bool drifts) {
+                               const S& ratio, bool fresh, bool goesOn, const WayAhead<S>& way) {
   friction = kinds.rub || kinds.turn;
   grips = kinds.grip;
   atOnce = settings.maxIterations < 2;
   drifting = kinds.drift;
   again = goesOn;
+  this->bend_ = way.bend;
   gatherBodies(source, colouring, ratio);
   fresh = fresh || !sameScales_ || rows.size() != contacts.size();
   impulses_ = &impulses;
@@ -30,14 +31,15 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   detail::resizeSparingly(marks, contacts.size());
   detail::resizeSparingly(gaps_, contacts.size());
   detail::resizeSparingly(turning, kinds.turn ? contacts.size() : 0);
-  const bool slips = friction && (kinds.drift || kinds.spring || (drifts && this->turns_));
+  const bool slips =
+      friction && (kinds.drift || kinds.spring || (way.follows && (this->turns_ || !way.bend.empty())));
   slipTargets.assign(slips ? rows.size() : 0, Vector3<S>::Zero());
   detail::resizeSparingly(rests_, contacts.size());
   detail::resizeSparingly(approaches_, contacts.size());
   passes = again && watch.holds() && sameScales_ && ratio == S(1) && turning.empty() && !kinds.spring &&
-           !drifting && !this->isScaled() && settings.restitutionThreshold == threshold_;
+           !drifting && way.bend.empty() && !this->isScaled() && settings.restitutionThreshold == threshold_;
   threshold_ = settings.restitutionThreshold;
-  const Taking<B> taking{contacts, source, colouring, dt, settings, fresh, drifts};
+  const Taking<B> taking{contacts, source, colouring, dt, settings, fresh, way};
   Most most = detail::sumOverParts(
       0, colouring.loneCount(), Most{}, [&](std::size_t begin, std::size_t end, Most& part) {
         forGroups(colouring, begin, end, [&](const Group& group) { put(group, take(taking, group, part)); });
@@ -87,6 +89,25 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   wrong_sq = most.wrong_sq;
   looks = most.looks;
   active = largestApproach > S(0);
+}
+
+template <Real S>
+template <class B, class Wanted>
+auto ContactProblem<S>::lookAtRows(const Taking<B>& taking, Wanted&& wanted) -> Most {
+  const ContactColoring& colouring = taking.colouring;
+  return detail::sumOverAllParts(colouring, Most{}, [&](std::size_t begin, std::size_t end, Most& part) {
+    if (begin < colouring.loneCount()) {
+      return;
+    }
+    detail::forGroupsOf<S>(
+        colouring, begin, end, [&](std::size_t k) { return wanted(k, part); },
+        [&](const Group& group) {
+          Lanes row = take(taking, group, part);
+          repeat(group, row);
+          put(group, row);
+          part += Most{S(0), wrongAt(group, row).largest(), group.count};
+        });
+  });
 }
 
 template <Real S>
@@ -161,8 +182,16 @@ inline S ContactProblem<S>::aim(const Taking<B>& taking, const Group& group, Lan
   const Pack v_n = present + drift;
   const Pack speed = sizeOf(v_n);
   const detail::TurningPair<S> turned = turningOf(taking, group, row, b1, b2, v_rel + drifts, v_n);
-  if (taking.drifts) {
+  const bool bends = taking.way.follows && !taking.way.bend.empty();
+  detail::PackedVector<S> slip = detail::PackedVector<S>::zero();
+  if (taking.way.follows) {
     allowed = allowed + turned.approach;
+    slip = turned.slip;
+  }
+  if (bends) {  // from here on it may be less than none: they part, to be drawn together on the way
+    const detail::PackedVector<S> bend = bendOf(taking, group);
+    allowed = allowed + row.n.dot(bend);
+    slip = slip - slipByBend(taking, row, bend, b1, b2);
   }
   // In a heap at rest relative accelerations vanish, and what a step brings is passed on by the others:
   // there no more than a fall of the step is rest.
@@ -170,7 +199,7 @@ inline S ContactProblem<S>::aim(const Taking<B>& taking, const Group& group, Lan
   const Pack pull = choose(load > zero, falls, zero);
   const Pack threshold = Pack::all(taking.settings.restitutionThreshold) + pull * Pack::all(taking.dt);
   const typename Pack::Truth fast = speed > speedIn(threshold);
-  row.target = smallerOf(zero, -allowed) - drift;
+  row.target = (bends ? -allowed : smallerOf(zero, -allowed)) - drift;
   for (std::size_t lane = 0; lane < group.count; ++lane) {
     const std::uint32_t k = group.row[lane];
     marks[k] = {.taken = true};
@@ -188,8 +217,7 @@ inline S ContactProblem<S>::aim(const Taking<B>& taking, const Group& group, Lan
     });
   }
   for (std::size_t lane = 0; lane < group.count && !slipTargets.empty(); ++lane) {
-    aimSlip(taking, group, lane, row, drift[lane],
-            taking.drifts ? turned.slip.at(lane) : Vector3<S>(Vector3<S>::Zero()));
+    aimSlip(taking, group, lane, row, drift[lane], slip.at(lane));
   }
   const Pack approach = row.target - present;
   S most(0);
@@ -198,34 +226,6 @@ inline S ContactProblem<S>::aim(const Taking<B>& taking, const Group& group, Lan
     most = std::max<S>(most, approach[lane]);
   }
   return most;
-}
-
-template <Real S>
-template <class B>
-inline auto ContactProblem<S>::driftsOf(const Taking<B>& taking, const Group& group) const
-    -> detail::PackedVector<S> {
-  if (!drifting) {
-    return detail::PackedVector<S>::zero();
-  }
-  const auto part = [&](Eigen::Index c) {
-    return Pack::of([&](std::size_t lane) { return S(driftOf(taking, group, lane)[c]); });
-  };
-  return {part(0), part(1), part(2)};
-}
-
-template <Real S>
-template <class B>
-inline auto ContactProblem<S>::turningOf(const Taking<B>& taking, const Group& group, const Lanes& row,
-                                         const detail::BodyLanes<S>& b1, const detail::BodyLanes<S>& b2,
-                                         const detail::PackedVector<S>& v, const Pack& v_n) const
-    -> detail::TurningPair<S> {
-  const Pack boundary = Pack::of(
-      [&](std::size_t lane) { return S(group.slot2[lane] == taking.colouring.staticSlot() ? 1 : 0); });
-  const detail::PackedVector<S> w =
-      friction ? row.c1 * b1.s + row.c2 * b2.s : detail::PackedVector<S>::zero();
-  return detail::TurningPair<S>::of(!(boundary > Pack::zero()), row.n, row.c1 * b1.spin + row.c2 * b2.spin,
-                                    largerOf(v.squaredNorm() - v_n * v_n, Pack::zero()), w,
-                                    b1.inverseMass + b2.inverseMass, taking.dt, speedExponent_);
 }
 
 template <Real S>
@@ -252,7 +252,7 @@ S ContactProblem<S>::rebound(const Taking<B>& taking, const Group& group, std::s
     const Material<S>& material = taking.contacts.material(contactOf(taking, group, lane));
     target = S(-restitutionAt(material, detail::scaled<S>(speed, -speedExponent_)) * v_n);
   }
-  return impact ? target : std::min<S>(target, -allowed);
+  return impact ? target : allowed < S(0) ? S(-allowed) : std::min<S>(target, -allowed);
 }
 
 template <Real S>

@@ -4,8 +4,10 @@
 /// What one asks of a contact solver, and what it answers.
 
 #include <gravel/core/check.hpp>
+#include <gravel/core/types.hpp>
 
 #include <algorithm>
+#include <span>
 #include <string>
 
 namespace gravel {
@@ -23,6 +25,18 @@ struct ContactSettings {
   int maxIterations = 100;  ///< >= 1: sweeps at most
   bool warmStart = true;    ///< begin from the impulses of the last step
   bool accelerate = true;   ///< momentum between sweeps; off: plain Gauss-Seidel
+};
+
+/// Where bodies go after a solve. Contacts are right at the end of the way that follows, as pairs turn on it
+/// and frames bend it (contact/turning_pair.hpp); where none follows, now.
+template <Real Scalar>
+struct WayAhead {
+  bool follows = false;  ///< for the dt of the solve
+  /// [m s^-2] by body, of the frame in which bodies move, besides their accelerations; empty where ways are
+  /// straight.
+  std::span<const Vector3<Scalar>> bend;
+  /// [s^-1] The frame turns the part of each spin across z by -frame dt.
+  Scalar frame = Scalar(0);
 };
 
 /// What a solve did.

@@ -84,10 +84,8 @@ class ContactSolver {
   /// Changes the velocities (and, where there is friction, the spins) of the bodies so that every contact
   /// of begin() obeys restitution and Coulomb's law. A second call takes the contacts to be where they were.
   /// \param dt [s] >= 0, the step for which the contacts stand
-  /// \param drifts bodies go on straight for dt at the velocities that they get: contacts are right at the
-  ///        end of that, as they turn on the way (contact/turning_pair.hpp); otherwise now
   template <ContactBodies B>
-  ContactReport<S> solve(B& bodies, const S& dt, bool drifts = false) {
+  ContactReport<S> solve(B& bodies, const S& dt, const WayAhead<S>& way = {}) {
     const ContactView<S>& contacts = contacts_;
     ContactReport<S> report;
     const bool goesOn = goesOn_;
@@ -110,7 +108,7 @@ class ContactSolver {
       const S ratio = settings_.warmStart && memoryStep_ > S(0) ? S(dt / memoryStep_) : S(0);
       rowImpulses_.resize(contacts.size(), facts_.kinds.turn);
       problem_.gather(contacts, bodies, coloring_, dt, settings_, facts_.kinds, rowImpulses_, *last, ratio,
-                      fresh_, goesOn && ratio > S(0), drifts);
+                      fresh_, goesOn && ratio > S(0), way);
       fresh_ = false;
       if (problem_.active) {
         report = std::visit([&](auto& algorithm) { return algorithm.solve(problem_, coloring_, settings_); },

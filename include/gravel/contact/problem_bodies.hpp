@@ -172,12 +172,17 @@ class ProblemBodies {
     }
   }
 
-  /// [m s^-2], zero of what nothing moves.
+  /// [m s^-2], with what its frame adds; zero of what nothing moves.
   template <class B>
-  static Vector3<S> accelerationOf(const B& source, const ContactColoring& colouring, std::size_t slot) {
+  Vector3<S> accelerationOf(const B& source, const ContactColoring& colouring, std::size_t slot) const {
     return colouring.movable(static_cast<std::uint32_t>(slot))
-               ? Vector3<S>(source.accelerations()[colouring.bodies()[slot]])
+               ? Vector3<S>(source.accelerations()[colouring.bodies()[slot]] + bendAt(colouring, slot))
                : Vector3<S>(Vector3<S>::Zero());
+  }
+  Vector3<S> bendAt(const ContactColoring& colouring, std::size_t slot) const {
+    const bool bends = !bend_.empty() && slot < colouring.bodies().size() &&
+                       colouring.movable(static_cast<std::uint32_t>(slot));
+    return bends ? bend_[colouring.bodies()[slot]] : Vector3<S>(Vector3<S>::Zero());
   }
 
   /// A body with its mass in place of its inverse, until the scale of masses is known.
@@ -200,8 +205,9 @@ class ProblemBodies {
 
   int speedExponent_ = 0;
   int massExponent_ = 0;
-  bool sameScales_ = false;  ///< as in the last problem
-  bool turns_ = false;       ///< spins may count in TurningPair
+  bool sameScales_ = false;           ///< as in the last problem
+  bool turns_ = false;                ///< spins may count in TurningPair
+  std::span<const Vector3<S>> bend_;  ///< of WayAhead
   /// Above that an impulse of the last problem would leave nothing but its rounding: speeds have fallen.
   S mostGuess_ = S(0);
 };

@@ -18,12 +18,12 @@ namespace gravel {
 /// none where they have grown (nonlinear nonsmooth conjugate gradients: Silcowitz, Niebe & Erleben 2010, Vis.
 /// Comput. 26, 893). A column of 30 takes some 140 sweeps in place of 2300, and a heavy ball on light ones
 /// stands, where sweeps without it pass on only a part of the weight in a step. Rejected: Nesterov's momentum
-/// (k/(k + 3), started anew when a sweep turns back), by which stacks of mass ratio 1000 sink 4 times as deep.
-/// Sweeps have the last word: results obey the cone.
-/// Where the first sweep changes few contacts, as in a heap at rest with some rattlers, the next ones look
-/// only at those that have moved since by more than half of what ends the sweeps, and go without momentum,
-/// until they have looked at as many contacts as there are. Shares the contacts of a large colour between
-/// threads; the same bits for any number of threads. O(contacts) a sweep.
+/// (k/(k + 3), started anew when a sweep turns back), by which stacks of mass ratio 1000 sink 4 times as
+/// deep. Sweeps have the last word: results obey the cone. Where the first sweep changes few contacts, as in
+/// a heap at rest with some rattlers, the next ones look only at those that have moved since by more than
+/// half of what ends the sweeps, and go without momentum, until they have looked at as many contacts as there
+/// are. Shares the contacts of a large colour between threads; the same bits for any number of threads.
+/// O(contacts) a sweep.
 template <Real S>
 class SequentialImpulses : private detail::RowImpulses<S> {
   using Base = detail::RowImpulses<S>;

@@ -27,6 +27,12 @@ struct HillFrame {
 
   bool turns() const { return !(omega == Scalar(0)) || !(vertical == Scalar(0)); }
 
+  /// [m s^-2] by which the epicycle bends away from a straight way at x with velocity v.
+  Vector3<Scalar> acceleration(const Vector3<Scalar>& x, const Vector3<Scalar>& v) const {
+    return {Scalar(2) * omega * v[1] + Scalar(3) * omega * omega * x[0], -Scalar(2) * omega * v[0],
+            -vertical * vertical * x[2]};
+  }
+
   /// Tidal and centrifugal potential per mass, -(3/2) Omega^2 x^2 + nu^2 z^2/2 [m^2 s^-2]. With it
   /// v^2/2 + potential is kept along an epicycle.
   Scalar potential(const Vector3<Scalar>& x) const {

@@ -148,7 +148,12 @@ class ContactStage {
         static_cast<int>(std::min<std::size_t>(config.contactIterations, std::numeric_limits<int>::max()));
     solver_.setSettings(settings);
     solver_.rebind(contacts_);  // the space may be a copy
-    const ContactReport<Scalar> half = solver_.solve(bodies, h, drifts);
+    const HillFrame<Scalar> frame(domain);
+    bend_.resize(frame.turns() ? bodies.size() : 0);
+    parallelFor(bend_.size(), 512, [&](std::size_t i) {
+      bend_[i] = frame.acceleration(bodies.positions()[i], bodies.velocities()[i]);
+    });
+    const ContactReport<Scalar> half = solver_.solve(bodies, h, {drifts, bend_, frame.omega});
     acted_ = half.iterations > 0;
     if (!acted_) {
       solver_.forget();  // its impulses are those of the solve before
@@ -295,6 +300,7 @@ class ContactStage {
   ContactSolver<Scalar> solver_;
   StepRecord<Scalar> record_;
   ContactReport<Scalar> report_;
+  std::vector<Vector3<Scalar>> bend_;  // of Hill's frame, at the last solve
   Scalar separationLoss_ = Scalar(0);
   bool idle_ = false;
   bool moved_ = false;
