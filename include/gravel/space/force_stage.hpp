@@ -3,17 +3,22 @@
 /// \file
 /// All accelerations of a step: mutual gravity, the uniform field, the user's own force.
 
+#include <gravel/contact/contact.hpp>
 #include <gravel/core/callback.hpp>
 #include <gravel/core/profiler.hpp>
 #include <gravel/dynamics/integrator.hpp>
 #include <gravel/gravity/gravity_solver.hpp>
 #include <gravel/output/energy_ledger.hpp>
 
+#include <span>
+#include <vector>
+
 namespace gravel {
 
 /// The user's own force: adds to `bodies.forces()` [N] and `bodies.torques()` [N m] at time t [s]. It is
-/// called from one thread once per force evaluation; mind that it may read positions and velocities and must
-/// change nothing else. Massless tracers have no force to add to. What it throws, or a force that is not
+/// called from one thread once per force evaluation, with the velocities of that moment as far as they are
+/// known (in methods of several drifts those of a stage); mind that it may read them and must change nothing
+/// else. Massless tracers have no force to add to. What it throws, or a force that is not
 /// finite (std::invalid_argument), ends the step half way: bodies have moved then, and the time has not.
 template <Real Scalar, class Layout>
 using ForceHook = Callback<void(Bodies<Scalar, Layout>&, Scalar)>;
@@ -44,9 +49,19 @@ class ForceStage {
   }
 
   /// Sets force, torque, acceleration and angular acceleration of every body at the present positions.
+  /// \param ahead [s] that velocities are behind positions, half a step after the first kick: the hook sees
+  ///        them as the last accelerations would bring them up (else a force that depends on them is of first
+  ///        order, and a magnetic one makes energy)
+  /// \param touching  of these bodies it sees the present ones: what contacts add is not known yet
   void evaluate(Bodies<Scalar, Layout>& bodies, const Scalar& G, const Scalar& softening,
-                const Domain<Scalar>& domain, const Scalar& time, Profiler& profiler) {
+                const Domain<Scalar>& domain, const Scalar& time, Profiler& profiler,
+                const Scalar& ahead = Scalar(0), std::span<const Contact<Scalar>> touching = {}) {
     const std::size_t n = bodies.size();
+    now_.clear();
+    ahead_.clear();
+    if (hook && ahead > Scalar(0)) {
+      bringUp(bodies, ahead, touching);
+    }
     const char* reason = reasonToSkip(bodies, G);
     if (reason == nullptr) {
       gravity.setDomain(domain, time);
@@ -155,6 +170,38 @@ class ForceStage {
     }
   }
 
+  struct Motion {
+    Vector3<Scalar> v;
+    Vector3<Scalar> w;
+  };
+
+  void bringUp(const Bodies<Scalar, Layout>& bodies, const Scalar& ahead,
+               std::span<const Contact<Scalar>> touching) {
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      const auto body = bodies[i];
+      now_.push_back({body.velocity(), body.angularVelocity()});
+    }
+    ahead_ = now_;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      if (!bodies[i].isFixed()) {
+        ahead_[i].v += ahead * Vector3<Scalar>(bodies[i].acceleration());
+        ahead_[i].w += ahead * Vector3<Scalar>(bodies[i].angularAcceleration());
+      }
+    }
+    for (const Contact<Scalar>& c : touching) {
+      ahead_[c.first] = now_[c.first];
+      if (c.second != staticPartner) {
+        ahead_[c.second] = now_[c.second];
+      }
+    }
+  }
+  static void show(Bodies<Scalar, Layout>& bodies, const std::vector<Motion>& motions) {
+    for (std::size_t i = 0; i < motions.size(); ++i) {
+      bodies[i].velocity() = motions[i].v;
+      bodies[i].angularVelocity() = motions[i].w;
+    }
+  }
+
   void addHook(Bodies<Scalar, Layout>& bodies, const Scalar& time) {
     const std::size_t n = bodies.size();
     hookForces_.resize(n);
@@ -162,7 +209,14 @@ class ForceStage {
       hookForces_[i] = bodies[i].force();
       bodies[i].torque() = Vector3<Scalar>::Zero().eval();
     }
-    hook(bodies, time);
+    show(bodies, ahead_);
+    try {
+      hook(bodies, time);
+    } catch (...) {
+      show(bodies, now_);
+      throw;
+    }
+    show(bodies, now_);
     for (std::size_t i = 0; i < n; ++i) {
       const auto body = bodies[i];
       hookForces_[i] = Vector3<Scalar>(body.force()) - hookForces_[i];
@@ -181,6 +235,8 @@ class ForceStage {
   }
 
   std::vector<Vector3<Scalar>> hookForces_;
+  std::vector<Motion> now_;    // of all bodies, while the hook sees others
+  std::vector<Motion> ahead_;  // what it sees
 };
 
 }  // namespace gravel

@@ -139,8 +139,7 @@ void Space<Scalar, Layout>::logSystemEnergy(std::size_t iteration) {
     logLine(("gravel: step " + std::to_string(iteration) + " contacts " + std::to_string(contactCount()) +
              " sweeps " + std::to_string(report.iterations) + " residual " + text(report.residual) +
              (contact_.domain.isOpen() ? " virial residual " + text(contactVirial().residual()) : "") +
-             " weight residual " +
-             text(supportedWeight().residual()))
+             " weight residual " + text(supportedWeight().residual()))
                 .c_str());
   }
   const Scalar inPlay = e.kinetic + e.rotational + abs(e.potential);

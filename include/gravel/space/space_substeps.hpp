@@ -130,8 +130,11 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
     if (late > Scalar(0)) {
       kick(Scalar(-late));  // back to the velocity of the step's middle, as one part has it here
     }
+    // Stages of several drifts stand at no moment of their own.
+    const Scalar ahead =
+        hasSeveralDrifts() && !apart ? Scalar(0) : Scalar((apart ? contact_dt_ : h) / Scalar(2));
     force_.evaluate(bodies_, getG(), this->config_.softening, contact_.domain,
-                    Scalar(time_ + (start + passed)), profiler_);
+                    Scalar(time_ + (start + passed)), profiler_, ahead, contacts().contacts);
     if (late > Scalar(0)) {
       kick(late);
     }
