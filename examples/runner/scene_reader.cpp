@@ -169,13 +169,17 @@ void readColumn(TableReader& reader, std::vector<SceneBody>& bodies) {
   generate(reader, bodies, look, [&] { return scenes::grainColumn<double>(options); });
 }
 
-/// Balls of diameter 1 and mass 1 in the periodic cube that [domain] then has to be.
-void readGas(TableReader& reader, std::vector<SceneBody>& bodies) {
+/// Balls of diameter 1 and mass 1 in a cube, which something has to hold together.
+void readGas(TableReader& reader, bool enclosed, std::vector<SceneBody>& bodies) {
   std::size_t count = 1000;
   double fraction = 0.1;
   reader.count("count", count, 1);
   reader.real("fraction", fraction, {1e-9, 0.3, "0 to 0.3"});
   const std::uint64_t seed = readSeed(reader);
+  if (!enclosed) {
+    reader.missing("walls: give a [domain] of kind \"periodic\" with three lengths of " +
+                   detail::formatReal(scenes::gasBoxLength(count, fraction)) + ", or a [[box]] around it");
+  }
   SceneBody look;
   look.surface = Surface::Smooth;
   readLook(reader, look);
@@ -342,7 +346,8 @@ Scene interpret(const toml::table& table, Faults& faults) {
   top.tables("body", [&](TableReader& reader) { readBody(reader, scene.bodies); });
   top.tables("cloud", [&](TableReader& reader) { readCloud(reader, scene.bodies); });
   top.tables("column", [&](TableReader& reader) { readColumn(reader, scene.bodies); });
-  top.tables("gas", [&](TableReader& reader) { readGas(reader, scene.bodies); });
+  const bool enclosed = !scene.domain.isOpen() || !scene.planes.empty();
+  top.tables("gas", [&](TableReader& reader) { readGas(reader, enclosed, scene.bodies); });
   top.table("output", [&](TableReader& reader) {
     reader.count("frames", scene.output.frames);
     reader.count("rows", scene.output.rows);

@@ -273,8 +273,6 @@ class GaussRadau15 {
   Scalar eta_ = Scalar(0.175);  // (5040e-9)^(1/7)
   std::size_t taken_ = 0;
   std::size_t rejected_ = 0;
-
- public:
   std::size_t iterations_ = 0;
 };
 
