@@ -94,7 +94,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       report.residual = change / problem.largestApproach;
       const bool ends = !(change > enough);
       const bool last = report.iterations >= settings.maxIterations;
-      const bool half = report.iterations == (settings.maxIterations + 1) / 2;
+      const bool half = report.iterations == settings.maxIterations - settings.maxIterations / 2;
       const bool more = !last && (ends || half) && problem.letSlide(colouring, S(4) * change);
       if (last || (ends && !more)) {
         problem.watch.setHolds(watched && ends);
