@@ -55,8 +55,8 @@ class ContactProblem : public detail::ProblemBodies<S> {
 
   /// Takes up bodies and contacts, and the first guess of the impulses with what it does to the bodies.
   /// \param dt [s] step that these contacts stand for, >= 0
-  /// \param impulses of this problem, to be, by row; as many as there are contacts, of any value. May be
-  ///        `last` itself, but for sweeps with momentum
+  /// \param impulses of this problem, to be, by row; as many as there are contacts, of any value; may be
+  ///        `last` itself
   /// \param last impulses of the last solve by row, zero for those that are new
   /// \param ratio of forces that last: the guess is `ratio` times `last`; 0 for none
   /// \param fresh contacts are others, or elsewhere, than at the last call

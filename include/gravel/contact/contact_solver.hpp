@@ -92,14 +92,11 @@ class ContactSolver {
     goesOn_ = false;
     listed_ = false;
     sameNames_ = !handedOn_;
-    // What was handed on gives way to what is solved, row by row; only momentum asks for it again.
+    // What was handed on gives way to what is solved, row by row.
     const detail::ImpulseList<S>* last = &rowImpulses_;
     if (sameNames_) {
       std::swap(before_.impulses(), rowImpulses_);
       last = &before_.impulses();
-    } else if (settings_.accelerate) {
-      guess_ = rowImpulses_;
-      last = &guess_;
     }
     handedOn_ = false;
     kept_ = false;
@@ -115,7 +112,7 @@ class ContactSolver {
                             algorithm_);
         kept_ = problem_.kept;
         if (kept_) {
-          problem_.keepLast(coloring_, last == &guess_ ? guess_ : before_.impulses());
+          problem_.keepLast(coloring_, before_.impulses());
         }
         energy_.settle(problem_, coloring_, contacts, otherRows_, report);
         otherRows_ = false;
@@ -297,7 +294,6 @@ class ContactSolver {
   bool listed_ = false;
   /// Of the solve before, whose contacts have other names unless `sameNames_`.
   detail::EarlierImpulses<S> before_;
-  detail::ImpulseList<S> guess_;     ///< what was handed on, for sweeps with momentum
   std::vector<Vector3<S>> changes_;  ///< by slot: of workOn()
   S memoryStep_ = S(0);
   bool handedOn_ = false;   ///< no solve() since

@@ -72,9 +72,6 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       return report;
     }
     const bool accelerate = settings.accelerate && settings.maxIterations > 2;
-    if (accelerate) {
-      begin(problem);
-    }
     bool local = problem.passes;
     if (local) {  // only rows that were not passed over are stale
       problem.watch.goOn(enough / S(2));
@@ -83,7 +80,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     }
     bool watched = true;  // all that moves bodies
     S beta = S(0);        // what a sweep begins with: this share of the step of the one before
-    S before = Eigen::NumTraits<S>::highest();
+    S before = S(0);      // square of the changes of that
     while (true) {
       const bool alone = local || report.iterations == 0 || !accelerate;  // without momentum
       const Progress now = sweep(problem, colouring, local, alone, beta);
@@ -108,17 +105,16 @@ class SequentialImpulses : private detail::RowImpulses<S> {
           problem.passes = false;
         }
         if (!local && accelerate) {
-          steps_.assign(problem.rows.size(), RowStep{});
           begin(problem);
         }
+      } else if (accelerate && report.iterations == 1) {
+        begin(problem);
+        before = more ? S(0) : now.size;
       } else if (accelerate) {
-        if (report.iterations == 1) {
-          findSteps(problem, colouring);
-        }
         // At high mass ratios changes fall by less than their rounding: that is no reason to begin anew.
         const bool falls = !more && now.size < S(1.001) * before;
         const S old = std::exchange(beta, falls ? std::min<S>(S(1), now.size / before) : S(0));
-        before = more ? Eigen::NumTraits<S>::highest() : now.size;
+        before = more ? S(0) : now.size;
         coast(problem, old, beta);
       }
     }
@@ -157,24 +153,9 @@ class SequentialImpulses : private detail::RowImpulses<S> {
         [&](std::size_t lane) { return group.holds(lane); });
   }
 
-  /// Steps of the first sweep: kept by none that stops there, or goes on with a few rows.
-  void findSteps(const ContactProblem<S>& problem, const ContactColoring& colouring) {
-    steps_.resize(problem.rows.size());
-    detail::forAllParts(colouring, [&](std::size_t begin, std::size_t end) {
-      if (begin < colouring.loneCount()) {
-        return;
-      }
-      problem.forGroups(colouring, begin, end, [&](const Group& group) {
-        const Lanes row = problem.load(group, true);
-        Lanes first = row;
-        problem.takeGuess(group, first, detail::BodyLanes<S>::load(problem.bodies, group.slot1),
-                          detail::BodyLanes<S>::load(problem.bodies, group.slot2));
-        storeStep(group, {row.jt - first.jt, row.jn - first.jn});
-      });
-    });
-  }
-
+  /// Steps are kept from here on.
   void begin(const ContactProblem<S>& problem) {
+    steps_.assign(problem.rows.size(), RowStep{});
     bodySteps_.resize(problem.bodies.size());
     parallelFor(problem.bodies.size(), chunk, [&](std::size_t slot) {
       bodySteps_[slot] = BodyStep{problem.bodies[slot].v, problem.bodies[slot].s};
