@@ -133,8 +133,7 @@ TEST_CASE("The work of a user's force is booked, to the second order of the step
 }
 
 // A charge in a magnetic field, v' = v x z, and a body that the air slows down, v' = -v, to t = 2.
-// Seen to fail: the hook sees the velocities of the half kick (order 1; the charge gains 0.7 of its energy at
-// h = 0.05 in ten turns' time).
+// Seen to fail: the hook sees the velocities of the half kick (order 1).
 TEST_CASE("A user's force that depends on velocity is of the second order of the step") {
   const auto error = [](double h, bool magnetic) {
     SimulationConfig<double> config = plain(h);
