@@ -256,7 +256,7 @@ TEST_CASE(
 }
 
 // Thirteen balls in the closest packing keep together at three tenths of the frequency at which the tide
-// takes balls off their surface. Seen to fail: as above (0.5 d).
+// takes balls off their surface. Seen to fail: as above (off by 3.7e-3).
 TEST_CASE("A clump with friction keeps its shape in the tide") {
   SimulationConfig<double> config = patchConfig(0);
   const double Omega = 0.3 * std::sqrt(13.0 / 27.0);
