@@ -132,6 +132,7 @@ auto ContactStage<Scalar, Layout>::allTouches() const -> Touches {
     c.key2 = impact.key2;
     c.normal = impact.normal;
     c.arm1 = impact.distance;
+    c.gap = c.arm2 = Scalar(0);  // a user's scalar may not begin at zero
     all.contacts.push_back(c, {});
     all.impulses.push_back(impact.impulse);
   }
