@@ -8,6 +8,7 @@
 #include <gravel/dynamics/adaptive_step.hpp>
 #include <gravel/dynamics/damping.hpp>
 #include <gravel/dynamics/encounter_step.hpp>
+#include <gravel/dynamics/pile_step.hpp>
 #include <gravel/fwd.hpp>
 #include <gravel/output/conserved.hpp>
 #include <gravel/output/contact_virial.hpp>
@@ -277,6 +278,7 @@ class Space : public Settings<Scalar> {
   Scalar hookPower_ = Scalar(0);
 
   OrbitStage<Scalar, Layout> orbits_;
+  PileStep<Scalar> piles_;
   Compensation<Scalar> lost_;  // what kicks and drifts lost to rounding
 
   // Positions and masses at the last force evaluation: forces are renewed if somebody changed them.

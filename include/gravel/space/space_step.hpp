@@ -211,6 +211,8 @@ void Space<Scalar, Layout>::updateAdaptiveTimeStep() {
   if (pulls) {
     wanted = std::min<Scalar>(
         wanted, stepFromEncounters(bodies_, getG(), c.softening, limits, contact_.domain.isOpen()));
+    wanted = std::clamp<Scalar>(limits.contactSteps * piles_.longest(bodies_, contacts().contacts),
+                                limits.smallest, wanted);
   }
   // A blow, or a change from outside, ends one smooth motion and begins another.
   dt_ =

@@ -61,7 +61,8 @@ bool Space<Scalar, Layout>::hasSeveralDrifts() const {
 
 /// Into how many parts a step of length h is divided. With one drift and where motion chooses: no two bodies
 /// that touch move past each other by more than a quarter of the smaller radius r in a part, nor would at the
-/// speed of a fall by r at their relative acceleration, for the flanks of heaps creep in longer steps.
+/// speed of a fall by r at their relative acceleration, for the flanks of heaps creep in longer steps; and
+/// piles held by their own gravity rest.
 template <Real Scalar, class Layout>
 std::size_t Space<Scalar, Layout>::chooseParts(const Scalar& h) {
   using std::sqrt;
@@ -88,7 +89,9 @@ std::size_t Space<Scalar, Layout>::chooseParts(const Scalar& h) {
     rate_sq = std::max<Scalar>(rate_sq, v.squaredNorm() / (r * r));
     rate_sq = std::max<Scalar>(rate_sq, Scalar(2) * Scalar(sqrt(a.squaredNorm())) / r);
   }
-  const Scalar wanted = Scalar(4) * h * sqrt(rate_sq);
+  const Scalar rests =
+      getG() == Scalar(0) ? Scalar(0) : Scalar(h / piles_.longest(bodies_, contacts().contacts));
+  const Scalar wanted = std::max<Scalar>(Scalar(4) * h * Scalar(sqrt(rate_sq)), rests);
   std::size_t parts = 1;
   while (parts < mostChosenSubsteps && Scalar(static_cast<double>(parts)) < wanted) {
     ++parts;

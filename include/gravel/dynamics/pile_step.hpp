@@ -1,0 +1,77 @@
+#pragma once
+
+/// \file
+/// The longest step in which a pile that its own gravity holds together comes to rest.
+///
+/// A grain at the surface falls by g h^2/2 in a step before contacts hold it again. Where that is more than a
+/// hundredth or so of its diameter d the pile does not rest: it boils. At rest are all piles of 200 to 10 000
+/// grains with
+///   h <= 0.1 sqrt(d/g)
+/// all boil from 0.18 on (measured: docs/theory-time-step.md). In a ball of even density accelerations have
+/// the root of the mean square sqrt(3/5) g (g at its surface, by mass), which is what g is found by here.
+
+#include <gravel/contact/contact_islands.hpp>
+
+#include <limits>
+
+namespace gravel {
+
+/// Islands of contacts, with room for the next step's.
+template <Real Scalar>
+class PileStep {
+ public:
+  /// [s] The shortest of these steps over all that contacts join, infinity without any. Diameters and
+  /// accelerations are means by mass, so that a pebble on a planet asks for nothing; accelerations are
+  /// relative to the centre of mass of those joined, so that neither a common fall nor an orbit does. Of the
+  /// pull of others only tides count. O(bodies + contacts), one thread.
+  template <ContactBodies B>
+  Scalar longest(const B& bodies, std::span<const Contact<Scalar>> contacts) {
+    using std::sqrt;
+    Scalar least = std::numeric_limits<double>::infinity();
+    if (contacts.empty()) {
+      return least;
+    }
+    islands_.find(contacts, bodies);
+    piles_.assign(bodies.size(), Pile{});
+    const auto each = [&](auto&& f) {
+      for (std::size_t i = 0; i < bodies.size(); ++i) {
+        if (detail::isMovable(bodies, i)) {
+          f(piles_[islands_.of(i)], Scalar(bodies.masses()[i]), i);
+        }
+      }
+    };
+    each([&](Pile& pile, const Scalar& m, std::size_t i) {
+      ++pile.count;
+      pile.mass += m;
+      pile.a += m * Vector3<Scalar>(bodies.accelerations()[i]);
+      pile.d += Scalar(2) * m * Scalar(bodies.radii()[i]);
+    });
+    each([&](Pile& pile, const Scalar& m, std::size_t i) {
+      if (pile.count > 1) {
+        pile.a_sq += m * (Vector3<Scalar>(bodies.accelerations()[i]) - pile.a / pile.mass).squaredNorm();
+      }
+    });
+    for (const Pile& pile : piles_) {
+      if (pile.a_sq > Scalar(0)) {
+        const Scalar g = sqrt(Scalar(Scalar(5) / Scalar(3) * (pile.a_sq / pile.mass)));
+        const Scalar h = sqrt(Scalar(pile.d / pile.mass / g)) / Scalar(10);
+        least = h > Scalar(0) && h < least ? h : least;  // 0 where a scalar's range was left
+      }
+    }
+    return least;
+  }
+
+ private:
+  struct Pile {
+    std::size_t count = 0;
+    Scalar mass = Scalar(0);
+    Vector3<Scalar> a = Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(0));  ///< sum of m a
+    Scalar d = Scalar(0);                                                  ///< sum of m d
+    Scalar a_sq = Scalar(0);                                               ///< sum of m |a - a_cm|^2
+  };
+
+  ContactIslands islands_;
+  std::vector<Pile> piles_;  ///< by the smallest index of a body in it
+};
+
+}  // namespace gravel
