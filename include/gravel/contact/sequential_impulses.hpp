@@ -9,8 +9,6 @@
 #include <gravel/contact/contact_energy.hpp>
 #include <gravel/contact/row_impulses.hpp>
 
-#include <utility>
-
 namespace gravel {
 
 /// Solver of a ContactProblem. Between sweeps the impulses go on along their last step, by the share beta of
@@ -113,9 +111,9 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       } else if (accelerate) {
         // At high mass ratios changes fall by less than their rounding: that is no reason to begin anew.
         const bool falls = !more && now.size < S(1.001) * before;
-        const S old = std::exchange(beta, falls ? std::min<S>(S(1), now.size / before) : S(0));
+        beta = falls ? std::min<S>(S(1), now.size / before) : S(0);
         before = more ? S(0) : now.size;
-        coast(problem, old, beta);
+        coast(problem, beta);
       }
     }
   }
@@ -124,12 +122,10 @@ class SequentialImpulses : private detail::RowImpulses<S> {
   static constexpr std::size_t chunk = 512;
   static constexpr std::size_t few = 8;  ///< one contact in so many
 
-  /// Step of a body's velocities from sweep to sweep.
-  struct BodyStep {
+  /// A body's velocities at the end of the last sweep.
+  struct BodySwept {
     Vector3<S> v;
     Vector3<S> s;
-    Vector3<S> dv = Vector3<S>::Zero();
-    Vector3<S> ds = Vector3<S>::Zero();
   };
 
   /// Of the impulses of a row, from sweep to sweep: a quad of scalars.
@@ -156,24 +152,24 @@ class SequentialImpulses : private detail::RowImpulses<S> {
   /// Steps are kept from here on.
   void begin(const ContactProblem<S>& problem) {
     steps_.assign(problem.rows.size(), RowStep{});
-    bodySteps_.resize(problem.bodies.size());
+    swept_.resize(problem.bodies.size());
     parallelFor(problem.bodies.size(), chunk, [&](std::size_t slot) {
-      bodySteps_[slot] = BodyStep{problem.bodies[slot].v, problem.bodies[slot].s};
+      swept_[slot] = BodySwept{problem.bodies[slot].v, problem.bodies[slot].s};
     });
   }
 
   /// Velocities follow the impulses beyond their last step: they are linear in the impulses.
-  void coast(ContactProblem<S>& problem, const S& old, const S& beta) {
+  void coast(ContactProblem<S>& problem, const S& beta) {
     parallelFor(problem.bodies.size(), chunk, [&](std::size_t slot) {
-      BodyStep& step = bodySteps_[slot];
+      BodySwept& last = swept_[slot];
       Body& b = problem.bodies[slot];
-      step.dv = old * step.dv + Vector3<S>(b.v - step.v);
-      b.v += beta * step.dv;
-      step.v = b.v;
+      const Vector3<S> dv = b.v - last.v;
+      last.v = b.v;
+      b.v += beta * dv;
       if (problem.friction) {
-        step.ds = old * step.ds + Vector3<S>(b.s - step.s);
-        b.s += beta * step.ds;
-        step.s = b.s;
+        const Vector3<S> ds = b.s - last.s;
+        last.s = b.s;
+        b.s += beta * ds;
       }
     });
   }
@@ -294,7 +290,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     sum += progress;
   }
 
-  std::vector<BodyStep> bodySteps_;
+  std::vector<BodySwept> swept_;
   std::vector<RowStep> steps_;  ///< of sweeps with momentum
 };
 
