@@ -28,6 +28,7 @@ Space<S, Layout> busy() {
   Space<S, Layout> space(config);
   const MaterialId soft =
       space.addMaterial({.restitution = S(0.1), .staticFriction = S(0.9), .kineticFriction = S(0.7)});
+  space.setPairMaterial(soft, defaultMaterial, {.restitution = S(0.7), .rollingFriction = S(0.02)});
   space.addPlane({S(0), S(0), S(1)}, S(-1.2), soft);
   space.addPlane({S(1), S(0), S(1)}, S(-1.6));
   space.setUniformField({S(0), S(0.1), S(-2)});
@@ -197,6 +198,7 @@ TEST_CASE("Settings, planes, materials and the domain come back") {
   CHECK(back.uniformField() == Vec(0, 0.1, -2));
   CHECK(back.addPlane({0, 0, 1}, -100.0) == 2);
   CHECK(back.addMaterial({}) == MaterialId{2});
+  CHECK(back.pairMaterial(defaultMaterial, MaterialId{1}).rollingFriction == 0.02);
   CHECK(back.body(BodyId{7}).isFixed());
 
   Space<double> box(plain(1e-3));

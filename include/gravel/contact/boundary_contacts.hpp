@@ -14,7 +14,7 @@ class BoundaryContacts {
  public:
   /// The arguments are those of NarrowPhase::find(). Surfaces are numbered from materials.size() on.
   template <class B>
-  void find(const B& bodies, std::span<const Material<S>> materials, std::span<const HalfSpace<S>> boundaries,
+  void find(const B& bodies, const MaterialView<S>& materials, std::span<const HalfSpace<S>> boundaries,
             const NarrowPhaseSettings<S>& settings,
             std::optional<std::span<const std::uint32_t>> nearBoundaries) {
     for (std::size_t b = 1; b < boundaries.size(); ++b) {
@@ -65,7 +65,7 @@ class BoundaryContacts {
   };
 
   template <class B>
-  static void append(std::size_t i, const B& bodies, std::span<const Material<S>> materials,
+  static void append(std::size_t i, const B& bodies, const MaterialView<S>& materials,
                      std::span<const HalfSpace<S>> boundaries, const NarrowPhaseSettings<S>& settings,
                      Part& part, RestingCursor& cursor) {
     const S radius = bodies.radii()[i];
@@ -81,7 +81,7 @@ class BoundaryContacts {
            mayRest(settings, {bodies.ids()[i], boundaryKey(wall.number)}, cursor))) {
         const std::uint32_t m = bodies.materials()[i];
         const std::uint32_t number = part.surfaces.of(
-            m, wall.number, wall.velocity, [&] { return mix(surfaceOf(materials, m), wall.material); });
+            m, wall.number, wall.velocity, [&] { return materials.pair(m, wall.surface, wall.material); });
         part.contacts.push_back({static_cast<std::uint32_t>(i), staticPartner, bodies.ids()[i],
                                  boundaryKey(wall.number), touch->normal, touch->gap, touch->arm1,
                                  touch->arm2, number});

@@ -4,7 +4,7 @@
 /// A contact: where two bodies touch.
 
 #include <gravel/contact/impulses.hpp>
-#include <gravel/contact/material.hpp>
+#include <gravel/contact/material_view.hpp>
 #include <gravel/core/random.hpp>
 
 #include <algorithm>
@@ -96,7 +96,8 @@ struct HalfSpace {
   Scalar offset;           ///< [m]
   Material<Scalar> material{};
   Vector3<Scalar> velocity = Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(0));  ///< [m s^-1] of its matter
-  std::uint64_t number = 0;  ///< by which its contacts are recognised
+  std::uint64_t number = 0;                                ///< by which its contacts are recognised
+  std::uint32_t surface = MaterialView<Scalar>::unlisted;  ///< number of its material, if it is an entry
 };
 
 /// Where two surfaces stand: normal from 1 to 2, gap < 0 for overlap, arms from the centres.

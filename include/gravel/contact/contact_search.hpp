@@ -73,15 +73,6 @@ bool mayRest(const NarrowPhaseSettings<S>& settings, const ContactKeys& keys, Re
          std::binary_search(settings.settled.begin(), settings.settled.end(), keys);
 }
 
-template <Real S>
-const Material<S>& surfaceOf(std::span<const Material<S>> materials, std::uint32_t id) {
-  if (id >= materials.size()) {
-    refuse("material of a body", std::to_string(id),
-           "below the number of materials, " + std::to_string(materials.size()));
-  }
-  return materials[id];
-}
-
 inline constexpr std::size_t contactChunk = 1024;
 
 /// Calls append(k, part, cursor) for k = 0 … n-1 in chunks. \return their number

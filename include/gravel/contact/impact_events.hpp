@@ -64,7 +64,7 @@ class ImpactEvents : private detail::ImpactForecast<S> {
   template <ContactBodies B, class Candidates, class Course = StraightCourse<S>, class Decide = NoDecision,
             class Support = NoSupport>
   ImpactReport<S> resolve(B& bodies, Candidates& near, const Domain<S>& domain,
-                          std::span<const Material<S>> materials, std::span<const HalfSpace<S>> walls,
+                          const MaterialView<S>& materials, std::span<const HalfSpace<S>> walls,
                           std::span<const ContactName> held, const ImpactSettings<S>& settings,
                           std::optional<std::span<const std::uint32_t>> nearWalls = std::nullopt,
                           Course&& course = {}, const Decide& decide = {}, const Support& support = {}) {
@@ -153,7 +153,7 @@ class ImpactEvents : private detail::ImpactForecast<S> {
     S a_n(0);
     Side one, two;
     Material<S> material;
-    const Material<S>& surface1 = detail::surfaceOf(scene.materials, bodies.materials()[event.first]);
+    const std::uint32_t m1 = bodies.materials()[event.first];
     if (boundary) {
       const HalfSpace<S>& wall = scene.walls[event.wall];
       n = -wall.normal;
@@ -161,7 +161,7 @@ class ImpactEvents : private detail::ImpactForecast<S> {
       a_n = -n.dot(scene.acceleration(event.first));
       drift = wall.velocity;
       one = Side::of(scene, event.first, distance, t);
-      material = mix(surface1, wall.material);
+      material = scene.materials.pair(m1, wall.surface, wall.material);
     } else {
       const RelativeFlight<S> flight = flightOf(scene, event.first, event.second, drift);
       const S r1 = bodies.radii()[event.first];
@@ -178,9 +178,7 @@ class ImpactEvents : private detail::ImpactForecast<S> {
       a_n = n.dot(flight.a);
       one = Side::of(scene, event.first, touch->arm1, t);
       two = Side::of(scene, event.second, touch->arm2, t);
-      const std::uint32_t m1 = bodies.materials()[event.first];
-      const std::uint32_t m2 = bodies.materials()[event.second];
-      material = m1 == m2 ? surface1 : mix(surface1, detail::surfaceOf(scene.materials, m2));
+      material = scene.materials.pair(m1, bodies.materials()[event.second]);
     }
     const Vector3<S> v_rel = two.v - one.v + drift;
     const S v_n = n.dot(v_rel);

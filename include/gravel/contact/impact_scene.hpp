@@ -24,7 +24,7 @@ template <class S, class B, class Course, class Support = NoSupport>
 struct ImpactScene {
   B& bodies;
   const Domain<S>& domain;
-  std::span<const Material<S>> materials;
+  MaterialView<S> materials;
   std::span<const HalfSpace<S>> walls;
   std::span<const ContactName> held;
   const ImpactSettings<S>& settings;

@@ -23,14 +23,14 @@ template <Real S>
 class NarrowPhase {
  public:
   /// \param pairs candidates, sorted by ids (spatial/pair.hpp), of indices into `bodies`
-  /// \param materials surface of each MaterialId that occurs
+  /// \param materials of each MaterialId that occurs; a vector or span of them will do
   /// \param boundaries half-spaces with unit normals, in increasing order of their numbers
   /// \param nearBoundaries indices of all bodies that may touch a boundary, increasing; without it every body
   ///        is looked at
   /// \throws std::invalid_argument for a material id without an entry, or boundaries out of order
   template <ContactBodies B>
   void find(std::span<const Pair> pairs, const B& bodies, const Domain<S>& domain,
-            std::span<const Material<S>> materials, std::span<const HalfSpace<S>> boundaries,
+            const MaterialView<S>& materials, std::span<const HalfSpace<S>> boundaries,
             const NarrowPhaseSettings<S>& settings, ContactList<S>& out,
             std::optional<std::span<const std::uint32_t>> nearBoundaries = std::nullopt) {
     walls_.find(bodies, materials, boundaries, settings, nearBoundaries);
@@ -62,9 +62,8 @@ class NarrowPhase {
   /// Pairs and boundaries in the order of keys, part by part. The geometry of pairs is found once more: that
   /// is less than to keep it meanwhile.
   template <class B>
-  void merge(std::size_t used, const B& bodies, const Domain<S>& domain,
-             std::span<const Material<S>> materials, const NarrowPhaseSettings<S>& settings,
-             ContactList<S>& out) {
+  void merge(std::size_t used, const B& bodies, const Domain<S>& domain, const MaterialView<S>& materials,
+             const NarrowPhaseSettings<S>& settings, ContactList<S>& out) {
     const auto before = [](const Contact<S>& wall, const ContactKeys& keys) {
       return ContactKeys{wall.key1, wall.key2} < keys;
     };
@@ -83,8 +82,8 @@ class NarrowPhase {
     const Start last = starts_.back();
     detail::resizeAnew(out.contacts, last.place + boundaryContacts.size() - last.wall);
     out.surfaces.clear();
-    for (const Material<S>& material : materials) {
-      out.surfaces.push_back({material});
+    for (std::uint32_t m = 0; m < materials.size(); ++m) {
+      out.surfaces.push_back({materials.pair(m, m)});
     }
     out.surfaces.insert(out.surfaces.end(), walls_.surfaces().begin(), walls_.surfaces().end());
     const auto common = static_cast<std::uint32_t>(out.surfaces.size());
@@ -121,7 +120,7 @@ class NarrowPhase {
         if (m_i != m_j || drifts) {
           const auto [m_1, m_2] = std::minmax(m_i, m_j);
           out[place].surface = common + own.of(m_1, m_2, drift, [&, m_1 = m_1, m_2 = m_2] {
-            return m_1 == m_2 ? materials[m_1] : mix(materials[m_1], materials[m_2]);
+            return materials.pair(m_1, m_2);
           });
         } else if (m_i != alike) {
           alike = m_i;
@@ -175,7 +174,7 @@ class NarrowPhase {
   }
 
   template <class B>
-  void appendPair(Pair pair, const B& bodies, const Domain<S>& domain, std::span<const Material<S>> materials,
+  void appendPair(Pair pair, const B& bodies, const Domain<S>& domain, const MaterialView<S>& materials,
                   const NarrowPhaseSettings<S>& settings, std::vector<Pair>& part, Cursor& cursor) const {
     const std::uint32_t i = pair.first;
     const std::uint32_t j = pair.second;
@@ -205,8 +204,8 @@ class NarrowPhase {
     if (!overlaps && !detail::mayRest(settings, keysOf(pair, bodies), cursor)) {
       return;
     }
-    (void)detail::surfaceOf(materials, bodies.materials()[i]);  // refused while the list is what it was
-    (void)detail::surfaceOf(materials, bodies.materials()[j]);
+    (void)materials[bodies.materials()[i]];  // refused while the list is what it was
+    (void)materials[bodies.materials()[j]];
     part.push_back(pair);
   }
 

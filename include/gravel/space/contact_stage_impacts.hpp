@@ -73,7 +73,7 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
   } near{neighbours_, way};
   const ImpactSettings<Scalar> settings{time, h, std::max(config.restitutionThreshold, config.epsilon),
                                         config.epsilon};
-  const std::span<const Material<Scalar>> surfaces(materials.entries());
+  const MaterialView<Scalar> surfaces = materials.view();
   const std::span<const HalfSpace<Scalar>> walls(walls_);
   const std::span<const ContactName> held = names();
   // Contacts that bear a body change its velocity by what it falls in half a step; those that stop it, by

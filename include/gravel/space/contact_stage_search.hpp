@@ -53,7 +53,7 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
     return;
   }
   const Profiler::Scope scope(profiler, Phase::NarrowPhase);
-  narrow_.find(neighbours_.pairs(), bodies, domain, materials.entries(), walls_, settings, contacts_,
+  narrow_.find(neighbours_.pairs(), bodies, domain, materials.view(), walls_, settings, contacts_,
                nearBoundaries(bodies, Scalar(0)));
   known_ = true;
 }
@@ -234,7 +234,7 @@ void ContactStage<Scalar, Layout>::prepareSurfaces(const Config& config) {
   walls_.clear();
   for (const Plane<Scalar>& plane : boundaries.planes()) {
     walls_.push_back({plane.normal, plane.offset, surfaces[static_cast<std::size_t>(plane.material)],
-                      plane.velocity, plane.number});
+                      plane.velocity, plane.number, static_cast<std::uint32_t>(plane.material)});
   }
 }
 

@@ -30,6 +30,14 @@ void ContactStage<Scalar, Layout>::save(SnapshotWriter& out) const {
   out.array("materials of planes", surfaces.data(), surfaces.size());
   out.array("numbers of planes", planeNumbers.data(), planeNumbers.size());
   out.array("materials", materials.entries().data(), materials.entries().size());
+  std::vector<std::uint32_t> ofPairs;
+  std::vector<Material<Scalar>> pairMaterials;
+  for (const auto& [first, second, material] : materials.pairs()) {
+    ofPairs.insert(ofPairs.end(), {first, second});
+    pairMaterials.push_back(material);
+  }
+  out.array("pairs of materials", ofPairs.data(), ofPairs.size());
+  out.array("materials of pairs", pairMaterials.data(), pairMaterials.size());
   std::vector<std::uint64_t> keys;
   numbers.clear();
   for (const StoredImpulse<Scalar>& stored : solver_.memory()) {
@@ -88,6 +96,8 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
   const auto surfaces = in.array<std::uint32_t>("materials of planes");
   const auto planeNumbers = in.array<std::uint64_t>("numbers of planes");
   auto surfacesOf = in.array<Material<Scalar>>("materials");
+  const auto ofPairs = in.array<std::uint32_t>("pairs of materials");
+  const auto pairMaterials = in.array<Material<Scalar>>("materials of pairs");
   const auto names = in.array<std::uint64_t>("names of contacts");
   const std::vector<Scalar> places = in.array<Scalar>("contacts");
   const auto pairs = in.array<Material<Scalar>>("materials of contacts");
@@ -95,10 +105,13 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
   const std::vector<Scalar> impulses = in.array<Scalar>("impulses");
   if (sides.size() != 10 * surfaces.size() || planeNumbers.size() != surfaces.size() + 2 ||
       2 * impulses.size() != 7 * keys.size() || surfacesOf.empty() || places.size() * 4 != names.size() * 9 ||
-      pairs.size() * 4 != names.size()) {
+      pairs.size() * 4 != names.size() || ofPairs.size() != 2 * pairMaterials.size()) {
     in.fail("holds lists of different lengths");
   }
   materials.assign(std::move(surfacesOf));
+  for (std::size_t p = 0; p < pairMaterials.size(); ++p) {
+    materials.setPair(MaterialId{ofPairs[2 * p]}, MaterialId{ofPairs[2 * p + 1]}, pairMaterials[p]);
+  }
   std::vector<Plane<Scalar>> planes;
   for (std::size_t p = 0; p < surfaces.size(); ++p) {
     materials.check(surfaces[p], "plane " + std::to_string(p));

@@ -4,7 +4,7 @@
 /// The surfaces of a space by MaterialId; the first one is the space's own, made from its settings.
 
 #include <gravel/bodies/bodies.hpp>
-#include <gravel/contact/material.hpp>
+#include <gravel/contact/material_view.hpp>
 #include <gravel/space/simulation_config.hpp>
 
 namespace gravel {
@@ -39,13 +39,35 @@ class MaterialTable {
     }
   }
 
-  /// The surfaces of two materials in contact, mixed. \throws std::invalid_argument, if there is none of them
+  /// These two have coefficients of their own as a pair, whatever they are alone.
+  /// \throws std::invalid_argument on coefficients out of range, or if there is none of them
+  void setPair(MaterialId a, MaterialId b, const Material<Scalar>& material) {
+    const auto first = static_cast<std::uint32_t>(std::min(a, b));
+    const auto second = static_cast<std::uint32_t>(std::max(a, b));
+    check(second, "a pair");
+    validate(material, "the pair");
+    const MaterialPair<Scalar> entry{first, second, material};
+    const auto place = std::lower_bound(pairs_.begin(), pairs_.end(), entry);
+    if (place != pairs_.end() && !(entry < *place)) {
+      place->material = material;
+    } else {
+      pairs_.insert(place, entry);
+    }
+  }
+
+  /// One of them, alone. \throws std::invalid_argument, if there is no such material
+  Material<Scalar> get(MaterialId id, const Config& config) const {
+    check(static_cast<std::uint32_t>(id), "this number");
+    return id == defaultMaterial ? ownOf(config) : entries_[static_cast<std::size_t>(id)];
+  }
+
+  /// Of two in contact. O(materials). \throws std::invalid_argument, if there is none of them
   Material<Scalar> pair(MaterialId a, MaterialId b, const Config& config) const {
-    const auto surface = [&](MaterialId id) {
-      check(static_cast<std::uint32_t>(id), "a pair");
-      return id == defaultMaterial ? ownOf(config) : entries_[static_cast<std::size_t>(id)];
-    };
-    return mix(surface(a), surface(b));
+    check(static_cast<std::uint32_t>(std::max(a, b)), "a pair");
+    std::vector<Material<Scalar>> all = entries_;
+    all[0] = ownOf(config);
+    return MaterialView<Scalar>(all, pairs_)
+        .pair(static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b));
   }
 
   /// All of them, the space's own by its present settings.
@@ -55,6 +77,9 @@ class MaterialTable {
   }
 
   const std::vector<Material<Scalar>>& entries() const { return entries_; }
+  const std::vector<MaterialPair<Scalar>>& pairs() const { return pairs_; }
+  /// As of the last renewed().
+  MaterialView<Scalar> view() const { return {entries_, pairs_}; }
   /// \param entries at least one
   void assign(std::vector<Material<Scalar>> entries) { entries_ = std::move(entries); }
 
@@ -71,6 +96,7 @@ class MaterialTable {
   }
 
   std::vector<Material<Scalar>> entries_ = std::vector<Material<Scalar>>(1);
+  std::vector<MaterialPair<Scalar>> pairs_;  ///< in their order
 };
 
 }  // namespace gravel

@@ -97,6 +97,16 @@ class Space : public Settings<Scalar> {
   const std::vector<Plane<Scalar>>& planes() const { return contact_.boundaries.planes(); }
   /// \throws std::invalid_argument on coefficients out of range
   MaterialId addMaterial(const Material<Scalar>& material);
+  /// From now on these two, or two surfaces of one, have measured coefficients in place of the mixed ones.
+  /// \throws std::invalid_argument on coefficients out of range, and for what is no material
+  void setPairMaterial(MaterialId a, MaterialId b, const Material<Scalar>& material) {
+    contact_.materials.setPair(a, b, material);
+  }
+  /// One of them alone, and what two are to each other. \throws std::invalid_argument for what is no material
+  Material<Scalar> material(MaterialId id) const { return contact_.materials.get(id, this->config_); }
+  Material<Scalar> pairMaterial(MaterialId a, MaterialId b) const {
+    return contact_.materials.pair(a, b, this->config_);
+  }
   /// \param g acceleration [m s^-2] of every movable body
   void setUniformField(const Vector& g);
   const Vector& uniformField() const { return force_.field; }
@@ -243,7 +253,6 @@ class Space : public Settings<Scalar> {
   typename ContactStage<Scalar, Layout>::Touches allTouches() const;
   void rememberPlaces();
   bool placesChanged() const;
-  Material<Scalar> pairMaterial(const CollisionContext& ctx) const;
   Scalar bindingEnergy(std::size_t i, const Scalar& time) const;
   std::vector<std::pair<BodyId, BodyId>> decideCollisions(const Scalar& time);
   void decideTouching();

@@ -229,23 +229,19 @@ void Space<Scalar, Layout>::handleCollision(BodyProxy& b1, BodyProxy& b2) {
 }
 
 template <Real Scalar, class Layout>
-Material<Scalar> Space<Scalar, Layout>::pairMaterial(const CollisionContext& ctx) const {
-  return contact_.materials.pair(ctx.body1.material(), ctx.body2.material(), this->config_);
-}
-
-template <Real Scalar, class Layout>
 auto Space<Scalar, Layout>::applyRestitutionImpulse(CollisionContext& ctx)
     -> std::tuple<Vector, Scalar, Scalar> {
-  const NormalImpulse<Scalar> blow =
-      applyNormalImpulse<Scalar, Layout>(ctx, restitutionAt<Scalar>(pairMaterial(ctx), -ctx.normalVelocity()),
-                                         std::max(this->config_.restitutionThreshold, this->config_.epsilon));
+  const NormalImpulse<Scalar> blow = applyNormalImpulse<Scalar, Layout>(
+      ctx,
+      restitutionAt<Scalar>(pairMaterial(ctx.body1.material(), ctx.body2.material()), -ctx.normalVelocity()),
+      std::max(this->config_.restitutionThreshold, this->config_.epsilon));
   return {blow.impulse, blow.magnitude, blow.bias};
 }
 
 template <Real Scalar, class Layout>
 auto Space<Scalar, Layout>::applyFrictionImpulse(const CollisionContext& ctx, Scalar jn,
                                                  const Vector& /*impulseN*/) -> Vector {
-  const Material<Scalar> m = pairMaterial(ctx);
+  const Material<Scalar> m = pairMaterial(ctx.body1.material(), ctx.body2.material());
   return gravel::applyFrictionImpulse<Scalar, Layout>(ctx, jn, m.staticFriction, m.kineticFriction,
                                                       m.tangentialRestitution);
 }
