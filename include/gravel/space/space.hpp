@@ -67,7 +67,8 @@ class Space : public Settings<Scalar> {
   void reserve(std::size_t n) { bodies_.reserve(n); }
   /// \throws std::invalid_argument naming the field, its value and what is allowed; then nothing is added
   BodyId addBody(const Body<Scalar>& body);
-  /// The last body takes its index. \throws std::out_of_range if no body has this id
+  /// The last body takes its index. Its energy is booked as `exchange`; where somebody's numbers are not
+  /// finite none is, and total() jumps. \throws std::out_of_range if no body has this id
   void removeBody(BodyId id);
   /// Sorts the bodies along a Morton curve, so that neighbours in space are neighbours in memory. Changes
   /// indices, not ids. O(N log N).

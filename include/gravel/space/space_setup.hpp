@@ -64,8 +64,13 @@ BodyId Space<Scalar, Layout>::addBody(const Body<Scalar>& body) {
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::removeBody(BodyId id) {
   const std::size_t i = bodies_.indexOf(id);
-  if (ledgerOpen_) {
-    left_.exchange += bindingEnergy(i, time_);
+  bool known = ledgerOpen_;
+  for (std::size_t k = 0; known && k < n(); ++k) {
+    known = isFinite(Vector(bodies_.positions()[k]));
+  }
+  const Scalar energy = known ? bindingEnergy(i, time_) : Scalar(0);
+  if (isFinite(energy)) {  // who has written what is no number must be able to get rid of it
+    left_.exchange += energy;
   }
   bodies_.remove(id);
   forcesValid_ = false;
