@@ -6,6 +6,7 @@
 #include <gravel/contact/contact.hpp>
 #include <gravel/contact/impact_scene.hpp>
 #include <gravel/contact/swept_spheres.hpp>
+#include <gravel/core/memory.hpp>
 #include <gravel/core/parallel.hpp>
 
 #include <numeric>
@@ -75,7 +76,7 @@ class ImpactForecast {
         }
       }
     });
-    queue_.clear();
+    clearSpare(queue_);
     for (std::size_t c = 0; c < count; ++c) {
       queue_.insert(queue_.end(), parts_[c].begin(), parts_[c].end());
     }

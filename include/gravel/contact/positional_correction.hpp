@@ -170,6 +170,7 @@ class PositionalCorrection {
       }
     });
     std::partial_sum(ends_.begin(), ends_.end(), ends_.begin());
+    detail::clearSpare(moved_);
     detail::resizeAnew(moved_, ends_.back());
     parallelForChunks<Share::Alike>(n, chunk, [&](std::size_t begin, std::size_t end) {
       std::size_t place = begin == 0 ? 0 : ends_[begin / chunk - 1];

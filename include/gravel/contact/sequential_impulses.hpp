@@ -152,7 +152,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
   /// Steps are kept from here on.
   void begin(const ContactProblem<S>& problem) {
     steps_.assign(problem.rows.size(), RowStep{});
-    swept_.resize(problem.bodies.size());
+    detail::resizeAnew(swept_, problem.bodies.size());
     parallelFor(problem.bodies.size(), chunk, [&](std::size_t slot) {
       swept_[slot] = BodySwept{problem.bodies[slot].v, problem.bodies[slot].s};
     });

@@ -262,7 +262,7 @@ std::span<const ContactName> ContactStage<Scalar, Layout>::names() {
 
 template <Real Scalar, class Layout>
 std::span<const ContactKeys> ContactStage<Scalar, Layout>::settled() {
-  settled_.clear();
+  detail::clearSpare(settled_);
   for (const Impact<Scalar>& impact : impacts_.impacts()) {
     if (impact.rests) {
       settled_.push_back({impact.key1, impact.key2});
