@@ -174,7 +174,8 @@ inline S ContactProblem<S>::aim(const Taking<B>& taking, const Group& group, Lan
   const Pack gap = Pack::of([&](std::size_t lane) { return gaps_[group.row[lane]]; });
   // The radii as the arms have them.
   const Pack radii = row.c1 * b1.spin + row.c2 * b2.spin - gap;
-  Pack allowed = speedIn(detail::RestingGap<S>::allowedApproach(gap, radii, falls, taking.dt));
+  Pack allowed =
+      speedIn(detail::RestingGap<S>::allowedApproach(gap, radii, falls, taking.dt, taking.settings.gapStep));
   const detail::PackedVector<S> v_rel = b2.v - b1.v;
   const Pack present = row.n.dot(v_rel);
   const detail::PackedVector<S> drifts = driftsOf(taking, group);

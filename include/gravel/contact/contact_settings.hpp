@@ -22,6 +22,9 @@ struct ContactSettings {
   /// speed of approach among the contacts. The error of the impulses is this times the number of sweeps that
   /// a disturbance takes through the pile.
   Scalar tolerance = Scalar(1e-6);
+  /// [s] >= 0: if it is longer than the step, gaps that may rest are those of a step of this length. What a
+  /// long step left would else be open in a short one, and lose its force.
+  Scalar gapStep = Scalar(0);
   int maxIterations = 100;  ///< >= 1: sweeps at most
   bool warmStart = true;    ///< begin from the impulses of the last step
   bool accelerate = true;   ///< momentum between sweeps; off: plain Gauss-Seidel
@@ -82,6 +85,7 @@ struct ContactImpulse {
 template <Real S>
 void validate(const ContactSettings<S>& settings) {
   detail::require("restitutionThreshold", settings.restitutionThreshold, detail::nonNegative<S>());
+  detail::require("gapStep", settings.gapStep, detail::nonNegative<S>());
   auto tolerance = detail::positive<S>();
   tolerance.high = S(1);
   tolerance.text = "> 0, <= 1";

@@ -188,11 +188,10 @@ class ImpactEvents : private detail::ImpactForecast<S> {
       return false;
     }
     const S speed = v_n < S(0) ? S(-v_n) : S(0);
-    // In a heap, where both already lean on others, what a step's fall brings is rest.
+    // In a heap, where both already lean on others, what a step's fall brings is rest, along what holds them.
     S threshold = scene.settings.restitutionThreshold;
     if (leans_[event.first] != 0 && (boundary || leans_[event.second] != 0)) {
-      S fall = detail::safeNorm(scene.freeAcceleration(event.first));
-      fall += boundary ? S(0) : detail::safeNorm(scene.freeAcceleration(event.second));
+      const S fall = scene.heldAlong(event.first, n) + (boundary ? S(0) : scene.heldAlong(event.second, n));
       threshold = std::max<S>(threshold, fall * h);
     }
     const bool bounces = !isDone(scene, event.first) && (boundary || !isDone(scene, event.second));

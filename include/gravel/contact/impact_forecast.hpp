@@ -189,7 +189,7 @@ class ImpactForecast {
       if (isHeld(scene, body, key1, key2)) {
         const S gap = wall.normal.dot(flight.place(from)) - radius;
         if (isDriven(scene, gap, radius, S(-wall.normal.dot(flight.velocity(from))),
-                     detail::safeNorm(scene.freeAcceleration(body)))) {
+                     scene.heldAlong(body, wall.normal))) {
           schedule({from, body, staticPartner, key1, key2, 0, 0, w});
         }
       } else if (const auto t = timeOfImpact<S>(flight, wall.normal, radius, from)) {
@@ -216,8 +216,7 @@ class ImpactForecast {
       const Vector3<S> r = flight.place(from);
       const S distance = detail::safeNorm(r);
       const Vector3<S> n = detail::safeUnit(r);
-      const S fall =
-          detail::safeNorm(scene.freeAcceleration(i)) + detail::safeNorm(scene.freeAcceleration(j));
+      const S fall = scene.heldAlong(i, n) + scene.heldAlong(j, n);
       if (isDriven(scene, S(distance - reach), reach, S(-n.dot(flight.velocity(from))), fall)) {
         schedule({from, i, j, key1, key2});
       }
@@ -293,7 +292,7 @@ class ImpactForecast {
   }
 
   /// A blow drives a held pair together, faster than what rests picks up in a step.
-  /// \param fall [m s^-2] |a_1| + |a_2|
+  /// \param fall [m s^-2] of both, as they are held
   template <class Scene>
   static bool isDriven(const Scene& scene, const S& gap, const S& reach, const S& u, const S& fall) {
     return gap <= reach / S(1000) && u > fall * scene.settings.h + scene.settings.restitutionThreshold;

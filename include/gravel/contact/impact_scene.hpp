@@ -19,7 +19,7 @@ namespace detail {
 
 /// \tparam Support  `support(i)` [m s^-2]: what the contacts that hold body i add to its acceleration. What
 /// rests on something would else be seen to rise by g h/2 at the start of a step and to sink at its end: a
-/// ball on it would be thrown up for ever.
+/// ball on it would be thrown up for ever. `support.any(i)`: the same also of contacts that stop it.
 template <class S, class B, class Course, class Support = NoSupport>
 struct ImpactScene {
   B& bodies;
@@ -45,6 +45,16 @@ struct ImpactScene {
   /// By which a body falls that nothing holds.
   Vector3<S> freeAcceleration(std::uint32_t i) const {
     return isMovable(bodies, i) ? Vector3<S>(course.acceleration(bodies, i)) : Vector3<S>(Vector3<S>::Zero());
+  }
+  /// The most [m s^-2] by which a body that leans on others would fall along n without them: what they hold
+  /// it with, no more than its own acceleration. Nothing along a table or a wall, nor in free fall.
+  S heldAlong(std::uint32_t i, const Vector3<S>& n) const {
+    const S fall = safeNorm(freeAcceleration(i));
+    if constexpr (!std::is_same_v<Support, NoSupport>) {
+      return isMovable(bodies, i) ? std::min<S>(fall, sizeOf<S>(n.dot(Vector3<S>(support.any(i))))) : fall;
+    } else {
+      return fall;
+    }
   }
   /// What support makes of the velocity of a movable body at t [s] since the start of the step.
   Vector3<S> velocityBySupport(std::uint32_t i, const S& t) const {

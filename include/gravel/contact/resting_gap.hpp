@@ -41,17 +41,29 @@ struct RestingGap {
 
   /// [m s^-1] >= 0
   /// \param gap [m] < 0 is overlap \param radii [m] their sum
-  /// \param accelerations |a_1| + |a_2| of the two [m s^-2] \param dt [s]
+  /// \param accelerations |a_1| + |a_2| of the two [m s^-2] \param dt [s] \param gapStep  of ContactSettings
   [[gnu::always_inline]] static inline P allowedApproach(const P& gap, const P& radii, const P& accelerations,
-                                                         const S& dt) {
+                                                         const S& dt, const S& gapStep) {
     const P open = choose(gap > P::zero(), gap, P::zero());
     if (!(dt > S(0))) {
       return choose(open > P::zero(), P::all(Eigen::NumTraits<S>::highest()), P::zero());
     }
     const P closed = P::all(restingMargin<S>() / S(64)) * radii;
-    const P kept = smallerOf(closed, accelerations * P::all(S(dt * dt / S(64))));
+    const S longer = std::max<S>(dt, gapStep);
+    const P kept = smallerOf(closed, accelerations * P::all(S(longer * longer / S(64))));
     return choose(open > kept, (open - kept) / P::all(dt), P::zero());
   }
 };
+
+/// The step whose gaps may rest, where steps become shorter: `last` in a step of h, then less. What rests
+/// falls into gaps that close, so they close slowly, by 3/32 of a fall from rest in each step.
+template <Real S>
+S nextGapStep(const S& last, const S& h) {
+  if (!(last > h)) {
+    return h;
+  }
+  const S ratio = h / last;
+  return std::max<S>(h, S(last * (S(1) - S(3) * ratio * ratio)));
+}
 
 }  // namespace gravel::detail

@@ -144,6 +144,7 @@ class ContactStage {
     ContactSettings<Scalar> settings = solver_.settings();
     settings.restitutionThreshold = std::max(config.restitutionThreshold, config.epsilon);
     settings.tolerance = config.contactTolerance;
+    settings.gapStep = gapStep_;
     settings.maxIterations =
         static_cast<int>(std::min<std::size_t>(config.contactIterations, std::numeric_limits<int>::max()));
     solver_.setSettings(settings);
@@ -294,6 +295,7 @@ class ContactStage {
   ImpactEvents<Scalar> impacts_;
   std::vector<ContactName> names_;
   std::vector<ContactKeys> settled_;
+  Scalar gapStep_ = Scalar(0);  // [s] of nextGapStep()
   mutable std::vector<ContactKeys> struck_;
   bool searched_ = false;  // neighbours_ hold for the whole drift
   ContactList<Scalar> contacts_;

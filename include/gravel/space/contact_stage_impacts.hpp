@@ -76,14 +76,23 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
   const MaterialView<Scalar> surfaces = materials.view();
   const std::span<const HalfSpace<Scalar>> walls(walls_);
   const std::span<const ContactName> held = names();
-  // Contacts that bear a body change its velocity by what it falls in half a step; those that stop it, by
-  // more.
-  const auto support = [&](std::uint32_t i) {
-    const Vector3<Scalar> dv = solver_.changeOf(i);
-    const Scalar fall = detail::safeNorm(Vector3<Scalar>(bodies.accelerations()[i])) * h;
-    return detail::safeNorm(dv) > fall ? Vector3<Scalar>(Vector3<Scalar>::Zero())
-                                       : Vector3<Scalar>(dv * (Scalar(2) / h));
-  };
+  struct Support {
+    const ContactSolver<Scalar>& solver;
+    const Bodies& bodies;
+    Scalar h;
+    bool none;  // the solver may know of others than these
+    Vector3<Scalar> any(std::uint32_t i) const {
+      return none ? Vector3<Scalar>(Vector3<Scalar>::Zero())
+                  : Vector3<Scalar>(solver.changeOf(i) * (Scalar(2) / h));
+    }
+    // Contacts that bear a body change its velocity by what it falls in half a step; those that stop it, by
+    // more.
+    Vector3<Scalar> operator()(std::uint32_t i) const {
+      const Vector3<Scalar> held = any(i);
+      const Scalar most = Scalar(2) * detail::safeNorm(Vector3<Scalar>(bodies.accelerations()[i]));
+      return detail::safeNorm(held) > most ? Vector3<Scalar>(Vector3<Scalar>::Zero()) : held;
+    }
+  } support{solver_, bodies, h, contacts_.empty()};
   ImpactReport<Scalar> blows;
   if (collisionHook) {
     const auto decide = [&](const Impact<Scalar>& impact, const Material<Scalar>& material,

@@ -40,7 +40,8 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
     search(bodies, config, time, AtRest{}, profiler);
   }
   prepareSurfaces(config);
-  NarrowPhaseSettings<Scalar> settings{time, config.epsilon, Scalar(0), h};
+  gapStep_ = goesOn ? detail::nextGapStep(gapStep_, h) : std::max<Scalar>(gapStep_, h);
+  NarrowPhaseSettings<Scalar> settings{time, config.epsilon, Scalar(0), gapStep_};
   if (goesOn) {
     settings.resting = names();
     settings.settled = settled();

@@ -62,6 +62,7 @@ void ContactStage<Scalar, Layout>::save(SnapshotWriter& out) const {
   out.array("keys of impulses", keys.data(), keys.size());
   out.array("impulses", numbers.data(), numbers.size());
   out.value("step of impulses", solver_.memoryStep());
+  out.value("step of gaps", gapStep_);
   const detail::SolvedProblem<Scalar> solved = coloured_ ? solver_.solved() : resumed_;
   numbers = {solved.still, solved.threshold};
   out.array("solved to", numbers.data(), numbers.size());
@@ -144,6 +145,7 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
     memory[k] = {keys[2 * k], keys[2 * k + 1], {j[0], {j[1], j[2], j[3]}, {j[4], j[5], j[6]}}};
   }
   solver_.setMemory(std::move(memory), in.value<Scalar>("step of impulses"));
+  gapStep_ = in.value<Scalar>("step of gaps");
   const std::vector<Scalar> to = in.array<Scalar>("solved to");
   const std::vector<Scalar> moved = in.array<Scalar>("solved bodies");
   const std::vector<Scalar> looked = in.array<Scalar>("solved contacts");

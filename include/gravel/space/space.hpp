@@ -241,7 +241,7 @@ class Space : public Settings<Scalar> {
   void applyDamping();
 
   void step(Scalar h, std::size_t iteration, const Scalar* until = nullptr);
-  static bool isWholeStepLeft(const Scalar& rest, const Scalar& h);
+  static Scalar stepTowards(const Scalar& rest, const Scalar& h);
   std::pair<Scalar, Scalar> timeAfter(const Scalar& h) const;
   bool areFewPoints() const;
   std::size_t moveFewPoints(const Scalar& h, const Scalar* until, Profiler::Step& timing);

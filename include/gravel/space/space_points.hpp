@@ -63,7 +63,8 @@ std::size_t Space<Scalar, Layout>::moveFewPoints(const Scalar& h, const Scalar* 
           const Profiler::Scope scope(profiler_, Phase::Integration);
           points.step(method, h, force_.field, gravity);
         }
-        if (until == nullptr || !points.isFinite() || !isWholeStepLeft(*until - timeAfter(h).first, h)) {
+        if (until == nullptr || !points.isFinite() ||
+            !(stepTowards(Scalar(*until - timeAfter(h).first), h) == h)) {
           break;
         }
         std::tie(time_, timeRest_) = timeAfter(h);

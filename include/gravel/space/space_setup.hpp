@@ -158,6 +158,7 @@ void Space<Scalar, Layout>::setDomain(const Domain<Scalar>& domain) {
   } else {
     contact_.domain = domain;
     wakeAll();
+    forcesValid_ = false;  // contacts are looked for again before the next step
   }
 }
 

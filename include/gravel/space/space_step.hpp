@@ -40,26 +40,30 @@ void Space<Scalar, Layout>::advanceTo(Scalar time) {
   while (time_ < time) {
     prepare();
     const Scalar rest = time - time_;
-    if (!isWholeStepLeft(rest, dt_)) {
-      const Scalar next = dt_;
-      step(rest, steps_);
-      if (!this->config_.adaptiveTimeStep) {
-        dt_ = next;
-      }
+    const Scalar next = dt_;
+    const Scalar h = stepTowards(rest, next);
+    const bool alike = h == next && !this->config_.adaptiveTimeStep && !this->config_.diagnosticsEnabled;
+    step(h, steps_, alike ? &time : nullptr);
+    if (!this->config_.adaptiveTimeStep) {
+      dt_ = next;
+    }
+    if (h == rest) {
       time_ = time;
       timeRest_ = Scalar(0);
-    } else {
-      const bool alike = !this->config_.adaptiveTimeStep && !this->config_.diagnosticsEnabled;
-      step(dt_, steps_, alike ? &time : nullptr);
     }
   }
 }
 
-/// Whether the rest of a run is longer than a step of length h. A rest of a millionth of a step is joined to
-/// the step: it is rounding in the sum of steps.
+/// The next step where steps of length h are wanted and `rest` of a run is left. The last two are alike where
+/// less than two are left: a step much shorter than others would upset what rests. A rest of a millionth of a
+/// step is joined to the step: it is rounding in the sum of steps.
 template <Real Scalar, class Layout>
-bool Space<Scalar, Layout>::isWholeStepLeft(const Scalar& rest, const Scalar& h) {
-  return !(rest <= h * Scalar(1.000001));
+Scalar Space<Scalar, Layout>::stepTowards(const Scalar& rest, const Scalar& h) {
+  const Scalar rounding(1e-6);
+  if (rest <= h * (Scalar(1) + rounding)) {
+    return rest;
+  }
+  return rest < Scalar(2) * h * (Scalar(1) - rounding) ? Scalar(rest / Scalar(2)) : h;
 }
 
 /// The time when h more has passed, and what is lost to rounding then.
