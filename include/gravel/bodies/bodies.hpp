@@ -229,7 +229,8 @@ class Bodies {
     const bool good = isFinite(body.position()) && isFinite(body.velocity()) &&
                       isFinite(body.angularVelocity()) && isFinite(m) && isFinite(r) && m >= Scalar(0) &&
                       r >= Scalar(0) && (m > Scalar(0) || r == Scalar(0) || body.isFixed()) &&
-                      isFinite(q_sq) && q_sq > Scalar(0) && isFinite(k) && k > Scalar(0);
+                      detail::hasSquare(r) && isFinite(q_sq) && q_sq > Scalar(0) && isFinite(k) &&
+                      k > Scalar(0);
     if (!good) {
       const std::string who = "body " + std::to_string(toInteger(body.id()));
       validate(body.load(), who);
@@ -248,7 +249,8 @@ class Bodies {
       const Tile r = tile(fields::Radius{});
       const Tile k = tile(fields::InertiaFactor{});
       Tile q_sq = tile(fields::Orientation{}, 3).square();
-      Tile size = m + r + k;
+      const Tile r_sq = r.square();
+      Tile size = m + Scalar(16) * r_sq + k;
       for (std::size_t c = 0; c < 3; ++c) {
         size += (tile(fields::Position{}, c).abs() + tile(fields::Velocity{}, c).abs()) +
                 tile(fields::AngularVelocity{}, c).abs();
@@ -258,7 +260,8 @@ class Bodies {
       for (std::size_t lane = 0; lane < std::min(detail::tileWidth, end - i); ++lane) {
         const auto at = static_cast<Eigen::Index>(lane);
         if (!(size[at] <= std::numeric_limits<Scalar>::max() && m[at] >= Scalar(0) && r[at] >= Scalar(0) &&
-              (m[at] > Scalar(0) || r[at] == Scalar(0)) && k[at] > Scalar(0) && q_sq[at] > Scalar(0))) {
+              (r[at] == Scalar(0) || (m[at] > Scalar(0) && r_sq[at] >= std::numeric_limits<Scalar>::min())) &&
+              k[at] > Scalar(0) && q_sq[at] > Scalar(0))) {
           validateOne(i + lane);
         }
       }
