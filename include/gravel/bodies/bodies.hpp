@@ -51,7 +51,11 @@ class Bodies {
   /// range; then the storage's memory was not written to
   explicit Bodies(Storage storage) : storage_(std::move(storage)) {
     for (std::size_t i = 0; i < size(); ++i) {
-      validate(adopted(i), "body " + std::to_string(i));
+      const std::string who = "body " + std::to_string(i);
+      validate(adopted(i), who);
+      if (const Scalar k = storage_.at(fields::InertiaFactor{}, i); !(k == Scalar(0))) {
+        checkFactor(k, who);
+      }
     }
     for (; nextId_ < size(); ++nextId_) {
       const auto i = static_cast<std::size_t>(nextId_);
@@ -233,7 +237,7 @@ class Bodies {
                       k > Scalar(0);
     if (!good) {
       const std::string who = "body " + std::to_string(toInteger(body.id()));
-      validate(body.load(), who);
+      validate(loadUnblamed(i), who);
       checkFactor(k, who);
     }
   }
@@ -274,15 +278,21 @@ class Bodies {
     }
   }
 
+  /// Body i without an inertia that a factor out of range makes: the factor is at fault, not the inertia.
+  Body<Scalar> loadUnblamed(std::size_t i) const {
+    Body<Scalar> body = (*this)[i].load();
+    if (const Scalar k = storage_.at(fields::InertiaFactor{}, i); !isFinite(k) || !(k > Scalar(0))) {
+      body.inertia.reset();
+    }
+    return body;
+  }
+
   /// Body i of a storage that was handed in, zeros of new storage filled in.
   Body<Scalar> adopted(std::size_t i) const {
-    Body<Scalar> body = (*this)[i].load();
+    Body<Scalar> body = loadUnblamed(i);
     if (body.orientation.coeffs() ==
         Quaternion<Scalar>(Scalar(0), Scalar(0), Scalar(0), Scalar(0)).coeffs()) {
       body.orientation = Quaternion<Scalar>::Identity();
-    }
-    if (Scalar(storage_.at(fields::InertiaFactor{}, i)) == Scalar(0)) {
-      body.inertia.reset();
     }
     return body;
   }
