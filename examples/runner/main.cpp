@@ -10,6 +10,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -74,11 +75,17 @@ class Schedule {
   Schedule(std::size_t times, double duration)
       : count_(times), interval_(times > 1 ? duration / static_cast<double>(times - 1) : duration) {}
   bool isDue(double time) {
-    if (next_ >= count_ || time < static_cast<double>(next_) * interval_) {
+    if (next_ >= count_ || time < at(next_)) {
       return false;
     }
-    while (next_ < count_ && time >= static_cast<double>(next_) * interval_) {
-      ++next_;
+    // By division: a count one by one would not end where there are far more times than steps.
+    const double passed = std::floor(time / interval_);
+    if (passed < static_cast<double>(count_)) {
+      next_ = std::max(next_, static_cast<std::size_t>(passed));
+      next_ += time >= at(next_) ? 1 : 0;  // what the quotient lost to rounding
+      next_ += time >= at(next_) ? 1 : 0;
+    } else {
+      next_ = count_;
     }
     return true;
   }
@@ -87,6 +94,8 @@ class Schedule {
   std::size_t count_, next_ = 0;
   double interval_;
 };
+  double at(std::size_t number) const { return static_cast<double>(number) * interval_; }
+
 
 /// Lets threads that wait sleep rather than spin. A step has some dozens of short parallel parts; where other
 /// programs want the same processors, spinning threads take away the time of those that they wait for, and
@@ -221,7 +230,14 @@ int main(int argc, char** argv) {
                    : "is " + text + "; allowed: a finite number > 0";
       });
   app.add_option("--frames", options.frames,
-                 "number of frames for ParaView, in place of the scene's own; 0: none");
+                 "number of frames for ParaView, in place of the scene's own; 0: none")
+      ->check([](const std::string& text) {
+        std::int64_t frames = 0;
+        return CLI::detail::lexical_cast(text, frames) && frames >= 0 &&
+                       static_cast<std::uint64_t>(frames) <= mostRecords
+                   ? std::string()
+                   : "is " + text + "; allowed: a whole number, 0 to " + std::to_string(mostRecords);
+      });
   app.add_option("--threads", options.threads, "threads; default: all (or OMP_NUM_THREADS)")
       ->check(CLI::Range(1, 4096));
   app.add_flag("--no-picture", options.noPicture, "draw no picture");

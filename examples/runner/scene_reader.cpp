@@ -310,12 +310,7 @@ void readPicture(TableReader& reader, PictureOptions& picture) {
     picture.span = span;
   }
   reader.real("fieldOfView", picture.fieldOfView, {1.0, 120.0, "1 to 120 degrees"});
-  const auto size = [&](const char* key, std::size_t& pixels) {
-    if (reader.count(key, pixels, 16) && pixels > 10000) {
-      reader.faults().add(reader.where(), std::string("\"") + key + "\" in [picture] is " +
-                                              std::to_string(pixels) + "; allowed: 16 to 10000 pixels");
-    }
-  };
+  const auto size = [&](const char* key, std::size_t& pixels) { reader.count(key, pixels, 16, 10000); };
   size("width", picture.width);
   size("height", picture.height);
   reader.real("smallestRadius", picture.smallestRadius, {0.0, 1000.0, "0 to 1000 pixels"});
@@ -349,8 +344,8 @@ Scene interpret(const toml::table& table, Faults& faults) {
   const bool enclosed = !scene.domain.isOpen() || !scene.planes.empty();
   top.tables("gas", [&](TableReader& reader) { readGas(reader, enclosed, scene.bodies); });
   top.table("output", [&](TableReader& reader) {
-    reader.count("frames", scene.output.frames);
-    reader.count("rows", scene.output.rows);
+    reader.count("frames", scene.output.frames, 0, mostRecords);
+    reader.count("rows", scene.output.rows, 0, mostRecords);
   });
   top.table("picture", [&](TableReader& reader) { readPicture(reader, scene.picture); });
   top.finish();
