@@ -16,6 +16,8 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iostream>
+#include <new>
 
 #ifdef _OPENMP
 #include <omp.h>
@@ -183,7 +185,7 @@ int run(const Options& options) {
   const std::string words = summary(scene, space, diagnostics.history(), facts);
   {
     std::ofstream file(folder / "summary.txt");
-    if (!(file << words)) {
+    if (!(file << words << std::flush)) {  // without it, what a full disk refuses is only known too late
       throw std::runtime_error("cannot write " + (folder / "summary.txt").string());
     }
   }
@@ -214,6 +216,13 @@ int run(const Options& options) {
 
 int main(int argc, char** argv) {
   waitPassively(argv);
+/// \throws std::runtime_error if something that was printed did not arrive, on a full disk for instance
+void requirePrinted() {
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+    throw std::runtime_error("cannot write to the standard output");
+  }
+}
+
   CLI::App app{
       "Simulates a scene of bodies that attract each other, collide, rub, spin and settle.\n"
       "Without a scene file: a cloud of 2000 rocks that becomes a rubble pile.",
@@ -248,7 +257,10 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    if (app.exit(error) != 0) {
+      return 2;
+    }
+    return std::cout.flush() ? 0 : 1;  // of --help and --version
   }
 #ifdef _OPENMP
   if (options.threads > 0) {
@@ -258,7 +270,9 @@ int main(int argc, char** argv) {
   std::signal(SIGINT, requestStop);
   std::signal(SIGTERM, requestStop);
   try {
-    return run(options);
+    const int status = run(options);
+    requirePrinted();
+    return status;
   } catch (const SceneError& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 2;
