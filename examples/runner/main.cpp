@@ -44,7 +44,7 @@ struct Options {
   bool noPicture = false, quiet = false, check = false, profile = false;
 };
 
-/// The space of a scene. \throws std::invalid_argument if the space refuses something
+/// The space of a scene, fit for its first step. \throws std::invalid_argument if the space refuses something
 Space<double> makeSpace(const Scene& scene) {
   Space<double> space(scene.config);
   space.setDomain(scene.domain);
@@ -57,6 +57,7 @@ Space<double> makeSpace(const Scene& scene) {
   for (const SceneBody& entry : scene.bodies) {
     space.addBody(entry.body);
   }
+  space.check();
   return space;
 }
 

@@ -362,6 +362,34 @@ TEST_CASE("A sphere that would touch its own image is refused before anything mo
   CHECK(space.body(0).position()[0] == x);
 }
 
+TEST_CASE("What the next step would refuse can be asked for without a step") {
+  Space<double> space(quiet());
+  CHECK_NOTHROW(space.check());
+  space.addBody(at({0, 0, 0}, 1.6));
+  CHECK_NOTHROW(std::as_const(space).check());
+  space.body(0).setMaterial(MaterialId{7});
+  CHECK_THROWS_WITH(space.check(), ContainsSubstring("material of body 0 is 7"));
+  space.body(0).setMaterial(defaultMaterial);
+  space.body(0).mass() = -1.0;
+  CHECK_THROWS_WITH(space.check(), ContainsSubstring("mass of body 0 is -1"));
+  space.body(0).mass() = 1.0;
+  space.setDomain(Domain<double>::periodic({4, 3, 5}));
+  CHECK_THROWS_WITH(space.check(), ContainsSubstring("radius of body 0 is 1.6; allowed: at most half"));
+  CHECK(space.time() == 0.0);
+
+  SimulationConfig<double> config = quiet();
+  config.integrator = IntegratorKind::WisdomHolman;
+  Space<double> planets(config);
+  Body<double> sun = at({0, 0, 0}, 0.0);
+  sun.fixed = true;
+  planets.addBody(sun);
+  CHECK_THROWS_WITH(planets.check(), ContainsSubstring("body 0 with the integrator WisdomHolman is fixed"));
+  planets.body(0).setFixed(false);
+  CHECK_NOTHROW(planets.check());
+  planets.body(0).mass() = 0.0;
+  CHECK_THROWS_WITH(planets.check(), ContainsSubstring("largest mass with the integrator WisdomHolman is 0"));
+}
+
 // Seen to fail: taken, and refused by the first step as the margin of a search, of no body.
 TEST_CASE("A radius whose square is no number is refused with its body") {
   Space<double> space(quiet());
