@@ -94,11 +94,11 @@ class Schedule {
   }
 
  private:
+  double at(std::size_t number) const { return static_cast<double>(number) * interval_; }
+
   std::size_t count_, next_ = 0;
   double interval_;
 };
-  double at(std::size_t number) const { return static_cast<double>(number) * interval_; }
-
 
 /// Lets threads that wait sleep rather than spin. A step has some dozens of short parallel parts; where other
 /// programs want the same processors, spinning threads take away the time of those that they wait for, and
@@ -120,12 +120,15 @@ int run(const Options& options) {
   scene.duration = options.duration.value_or(scene.duration);
   scene.output.frames = options.frames.value_or(scene.output.frames);
 
+  const std::string sceneName = options.sceneFile.empty() ? builtinSceneName : options.sceneFile;
   Space<double> space = [&] {
     try {
       return makeSpace(scene);
     } catch (const std::invalid_argument& error) {
-      throw SceneError((options.sceneFile.empty() ? builtinSceneName : options.sceneFile) + ": " +
-                       error.what());
+      throw SceneError(sceneName + ": " + error.what());
+    } catch (const std::bad_alloc&) {
+      throw SceneError(sceneName + ": there is no memory for " +
+                       counted(scene.config.bodyCount + scene.bodies.size(), "body", "bodies"));
     }
   }();
   const bool talks = !options.quiet;
@@ -213,10 +216,6 @@ int run(const Options& options) {
   return facts.interrupted ? 130 : 0;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  waitPassively(argv);
 /// \throws std::runtime_error if something that was printed did not arrive, on a full disk for instance
 void requirePrinted() {
   if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
@@ -224,6 +223,10 @@ void requirePrinted() {
   }
 }
 
+}  // namespace
+
+int main(int argc, char** argv) {
+  waitPassively(argv);
   CLI::App app{
       "Simulates a scene of bodies that attract each other, collide, rub, spin and settle.\n"
       "Without a scene file: a cloud of 2000 rocks that becomes a rubble pile.",

@@ -280,6 +280,12 @@ class TableReader {
     return false;
   }
 
+  /// Of a key that stands here, or of the table where it has its default.
+  bool fault(const char* key, const std::string& value, const std::string& allowed) {
+    const toml::node* node = table_.get(key);
+    return fault(node != nullptr ? *node : table_, key, value, allowed);
+  }
+
   void finish() {
     for (const auto& [key, node] : table_) {
       if (std::find(known_.begin(), known_.end(), key.str()) == known_.end()) {
