@@ -10,11 +10,14 @@
 
 #include <CLI/CLI.hpp>
 
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iostream>
+#include <new>
 
 #ifdef _OPENMP
 #include <omp.h>
@@ -41,7 +44,7 @@ struct Options {
   bool noPicture = false, quiet = false, check = false, profile = false;
 };
 
-/// The space of a scene. \throws std::invalid_argument if the space refuses something
+/// The space of a scene, fit for its first step. \throws std::invalid_argument if the space refuses something
 Space<double> makeSpace(const Scene& scene) {
   Space<double> space(scene.config);
   space.setDomain(scene.domain);
@@ -54,6 +57,7 @@ Space<double> makeSpace(const Scene& scene) {
   for (const SceneBody& entry : scene.bodies) {
     space.addBody(entry.body);
   }
+  space.check();
   return space;
 }
 
@@ -74,16 +78,24 @@ class Schedule {
   Schedule(std::size_t times, double duration)
       : count_(times), interval_(times > 1 ? duration / static_cast<double>(times - 1) : duration) {}
   bool isDue(double time) {
-    if (next_ >= count_ || time < static_cast<double>(next_) * interval_) {
+    if (next_ >= count_ || time < at(next_)) {
       return false;
     }
-    while (next_ < count_ && time >= static_cast<double>(next_) * interval_) {
-      ++next_;
+    // By division: a count one by one would not end where there are far more times than steps.
+    const double passed = std::floor(time / interval_);
+    if (passed < static_cast<double>(count_)) {
+      next_ = std::max(next_, static_cast<std::size_t>(passed));
+      next_ += time >= at(next_) ? 1 : 0;  // what the quotient lost to rounding
+      next_ += time >= at(next_) ? 1 : 0;
+    } else {
+      next_ = count_;
     }
     return true;
   }
 
  private:
+  double at(std::size_t number) const { return static_cast<double>(number) * interval_; }
+
   std::size_t count_, next_ = 0;
   double interval_;
 };
@@ -108,12 +120,15 @@ int run(const Options& options) {
   scene.duration = options.duration.value_or(scene.duration);
   scene.output.frames = options.frames.value_or(scene.output.frames);
 
+  const std::string sceneName = options.sceneFile.empty() ? builtinSceneName : options.sceneFile;
   Space<double> space = [&] {
     try {
       return makeSpace(scene);
     } catch (const std::invalid_argument& error) {
-      throw SceneError((options.sceneFile.empty() ? builtinSceneName : options.sceneFile) + ": " +
-                       error.what());
+      throw SceneError(sceneName + ": " + error.what());
+    } catch (const std::bad_alloc&) {
+      throw SceneError(sceneName + ": there is no memory for " +
+                       counted(scene.config.bodyCount + scene.bodies.size(), "body", "bodies"));
     }
   }();
   const bool talks = !options.quiet;
@@ -174,7 +189,7 @@ int run(const Options& options) {
   const std::string words = summary(scene, space, diagnostics.history(), facts);
   {
     std::ofstream file(folder / "summary.txt");
-    if (!(file << words)) {
+    if (!(file << words << std::flush)) {  // without it, what a full disk refuses is only known too late
       throw std::runtime_error("cannot write " + (folder / "summary.txt").string());
     }
   }
@@ -201,6 +216,13 @@ int run(const Options& options) {
   return facts.interrupted ? 130 : 0;
 }
 
+/// \throws std::runtime_error if something that was printed did not arrive, on a full disk for instance
+void requirePrinted() {
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+    throw std::runtime_error("cannot write to the standard output");
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -221,7 +243,14 @@ int main(int argc, char** argv) {
                    : "is " + text + "; allowed: a finite number > 0";
       });
   app.add_option("--frames", options.frames,
-                 "number of frames for ParaView, in place of the scene's own; 0: none");
+                 "number of frames for ParaView, in place of the scene's own; 0: none")
+      ->check([](const std::string& text) {
+        std::int64_t frames = 0;
+        return CLI::detail::lexical_cast(text, frames) && frames >= 0 &&
+                       static_cast<std::uint64_t>(frames) <= mostRecords
+                   ? std::string()
+                   : "is " + text + "; allowed: a whole number, 0 to " + std::to_string(mostRecords);
+      });
   app.add_option("--threads", options.threads, "threads; default: all (or OMP_NUM_THREADS)")
       ->check(CLI::Range(1, 4096));
   app.add_flag("--no-picture", options.noPicture, "draw no picture");
@@ -232,7 +261,10 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    if (app.exit(error) != 0) {
+      return 2;
+    }
+    return std::cout.flush() ? 0 : 1;  // of --help and --version
   }
 #ifdef _OPENMP
   if (options.threads > 0) {
@@ -242,7 +274,9 @@ int main(int argc, char** argv) {
   std::signal(SIGINT, requestStop);
   std::signal(SIGTERM, requestStop);
   try {
-    return run(options);
+    const int status = run(options);
+    requirePrinted();
+    return status;
   } catch (const SceneError& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 2;

@@ -36,6 +36,9 @@ struct Units {
   bool areSI() const { return length == "m" && time == "s" && mass == "kg"; }
 };
 
+/// Most frames or rows that can be asked for: more than any run has steps.
+inline constexpr std::size_t mostRecords = 1'000'000'000;
+
 struct OutputOptions {
   std::size_t frames = 60;  ///< .vtp files, the start and the end among them; 0 for none
   std::size_t rows = 300;   ///< of the table of diagnostics

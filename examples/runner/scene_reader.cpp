@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <new>
 #include <sstream>
 
 namespace gravel::runner {
@@ -15,6 +16,9 @@ using Range = detail::Range<double>;
 Range positive() {
   return {std::numeric_limits<double>::min(), std::numeric_limits<double>::max(), "finite, > 0"};
 }
+/// No pair search takes more.
+constexpr std::size_t mostBodies = std::numeric_limits<std::uint32_t>::max() - 1;
+
 Range notNegative() { return detail::nonNegative<double>(); }
 
 /// [simulation]: every field of SimulationConfig under its own name, by the library's own list of them.
@@ -31,12 +35,13 @@ void readSimulation(TableReader& reader, SimulationConfig<double>& config) {
         value = static_cast<T>(chosen);
       }
     } else {
+      std::uint64_t most =
+          std::min<std::uint64_t>(std::numeric_limits<T>::max(), std::numeric_limits<std::int64_t>::max());
+      if (std::string_view(setting.name) == "bodyCount") {
+        most = mostBodies;
+      }
       std::size_t read = 0;
-      if (reader.count(setting.name, read)) {
-        if (read > std::numeric_limits<T>::max()) {
-          reader.faults().add(reader.where(),
-                              std::string("\"") + setting.name + "\" in [simulation] is too large");
-        }
+      if (reader.count(setting.name, read, 0, most)) {
         value = static_cast<T>(read);
       }
     }
@@ -110,9 +115,10 @@ void append(TableReader& reader, std::vector<SceneBody>& bodies, const SceneBody
   }
 }
 
-/// Runs a generator unless a fault stands already; what it refuses is a fault of its table.
+/// Runs a generator of `count` bodies unless a fault stands already; what it refuses is a fault of its table.
 template <class Generate>
-void generate(TableReader& reader, std::vector<SceneBody>& bodies, const SceneBody& look, Generate&& make) {
+void generate(TableReader& reader, std::vector<SceneBody>& bodies, const SceneBody& look, std::size_t count,
+              Generate&& make) {
   if (reader.faults().any()) {
     return;
   }
@@ -120,6 +126,8 @@ void generate(TableReader& reader, std::vector<SceneBody>& bodies, const SceneBo
     append(reader, bodies, look, make());
   } catch (const std::invalid_argument& error) {
     reader.faults().add(reader.where(), error.what());
+  } catch (const std::bad_alloc&) {
+    reader.fault("count", std::to_string(count), "as many bodies as there is memory for");
   }
 }
 
@@ -132,7 +140,7 @@ std::uint64_t readSeed(TableReader& reader) {
 void readCloud(TableReader& reader, std::vector<SceneBody>& bodies) {
   scenes::CloudOptions options;
   Vector3<double> position = Vector3<double>::Zero(), velocity = Vector3<double>::Zero();
-  reader.count("count", options.count, 1);
+  reader.count("count", options.count, 1, mostBodies);
   options.seed = readSeed(reader);
   reader.vector("position", position);
   reader.vector("velocity", velocity);
@@ -145,7 +153,7 @@ void readCloud(TableReader& reader, std::vector<SceneBody>& bodies) {
   reader.real("bodySpin", options.bodySpin, notNegative());
   SceneBody look;
   readLook(reader, look);
-  generate(reader, bodies, look, [&] {
+  generate(reader, bodies, look, options.count, [&] {
     auto made = scenes::rubbleCloud<double>(options);
     for (Body<double>& body : made) {
       body.position += position;
@@ -157,7 +165,7 @@ void readCloud(TableReader& reader, std::vector<SceneBody>& bodies) {
 
 void readColumn(TableReader& reader, std::vector<SceneBody>& bodies) {
   scenes::ColumnOptions options;
-  reader.count("count", options.count, 1);
+  reader.count("count", options.count, 1, mostBodies);
   options.seed = readSeed(reader);
   reader.vector("base", options.base);
   reader.vector("velocity", options.velocity);
@@ -166,14 +174,14 @@ void readColumn(TableReader& reader, std::vector<SceneBody>& bodies) {
   reader.real("density", options.density, positive());
   SceneBody look;
   readLook(reader, look);
-  generate(reader, bodies, look, [&] { return scenes::grainColumn<double>(options); });
+  generate(reader, bodies, look, options.count, [&] { return scenes::grainColumn<double>(options); });
 }
 
 /// Balls of diameter 1 and mass 1 in a cube, which something has to hold together.
 void readGas(TableReader& reader, bool enclosed, std::vector<SceneBody>& bodies) {
   std::size_t count = 1000;
   double fraction = 0.1;
-  reader.count("count", count, 1);
+  reader.count("count", count, 1, mostBodies);
   reader.real("fraction", fraction, {1e-9, 0.3, "0 to 0.3"});
   const std::uint64_t seed = readSeed(reader);
   if (!enclosed) {
@@ -183,7 +191,7 @@ void readGas(TableReader& reader, bool enclosed, std::vector<SceneBody>& bodies)
   SceneBody look;
   look.surface = Surface::Smooth;
   readLook(reader, look);
-  generate(reader, bodies, look, [&] { return scenes::randomGas<double>(count, fraction, seed); });
+  generate(reader, bodies, look, count, [&] { return scenes::randomGas<double>(count, fraction, seed); });
 }
 
 void readMaterial(TableReader& reader, const SimulationConfig<double>& config, ScenePlane& plane) {
@@ -310,12 +318,7 @@ void readPicture(TableReader& reader, PictureOptions& picture) {
     picture.span = span;
   }
   reader.real("fieldOfView", picture.fieldOfView, {1.0, 120.0, "1 to 120 degrees"});
-  const auto size = [&](const char* key, std::size_t& pixels) {
-    if (reader.count(key, pixels, 16) && pixels > 10000) {
-      reader.faults().add(reader.where(), std::string("\"") + key + "\" in [picture] is " +
-                                              std::to_string(pixels) + "; allowed: 16 to 10000 pixels");
-    }
-  };
+  const auto size = [&](const char* key, std::size_t& pixels) { reader.count(key, pixels, 16, 10000); };
   size("width", picture.width);
   size("height", picture.height);
   reader.real("smallestRadius", picture.smallestRadius, {0.0, 1000.0, "0 to 1000 pixels"});
@@ -349,8 +352,8 @@ Scene interpret(const toml::table& table, Faults& faults) {
   const bool enclosed = !scene.domain.isOpen() || !scene.planes.empty();
   top.tables("gas", [&](TableReader& reader) { readGas(reader, enclosed, scene.bodies); });
   top.table("output", [&](TableReader& reader) {
-    reader.count("frames", scene.output.frames);
-    reader.count("rows", scene.output.rows);
+    reader.count("frames", scene.output.frames, 0, mostRecords);
+    reader.count("rows", scene.output.rows, 0, mostRecords);
   });
   top.table("picture", [&](TableReader& reader) { readPicture(reader, scene.picture); });
   top.finish();

@@ -10,6 +10,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -108,17 +110,22 @@ class TableReader {
     return node != nullptr && number(*node, key, value, range);
   }
 
-  bool count(const char* key, std::size_t& value, std::size_t least = 0) {
+  /// \param most  TOML has no larger number than the one that stands here for any
+  bool count(const char* key, std::size_t& value, std::size_t least = 0,
+             std::uint64_t most = std::numeric_limits<std::int64_t>::max()) {
     const toml::node* node = take(key);
     if (node == nullptr) {
       return false;
     }
-    const std::string allowed = "a whole number >= " + std::to_string(least);
+    const std::string allowed =
+        most < std::numeric_limits<std::int64_t>::max()
+            ? "a whole number, " + std::to_string(least) + " to " + std::to_string(most)
+            : "a whole number >= " + std::to_string(least);
     const auto x = node->value_exact<std::int64_t>();
     if (!x) {
       return wrongType(*node, key, allowed);
     }
-    if (*x < 0 || static_cast<std::uint64_t>(*x) < least) {
+    if (*x < 0 || static_cast<std::uint64_t>(*x) < least || static_cast<std::uint64_t>(*x) > most) {
       return fault(*node, key, std::to_string(*x), allowed);
     }
     value = static_cast<std::size_t>(*x);
@@ -271,6 +278,12 @@ class TableReader {
     faults_.add(node.source(),
                 "\"" + std::string(key) + "\" in " + name_ + " is " + value + "; allowed: " + allowed);
     return false;
+  }
+
+  /// Of a key that stands here, or of the table where it has its default.
+  bool fault(const char* key, const std::string& value, const std::string& allowed) {
+    const toml::node* node = table_.get(key);
+    return fault(node != nullptr ? *node : table_, key, value, allowed);
   }
 
   void finish() {

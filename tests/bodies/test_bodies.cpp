@@ -268,9 +268,12 @@ TEMPLATE_LIST_TEST_CASE("bodies: validateAll finds what was written past the doo
   const auto factor = [&](const S& k) {
     return [&c, k](auto b) { c.bodies.inertiaFactors()[b.index()] = k; };
   };
-  found("inertia", factor(nan));
-  found("inertia", factor(S(-1)));
-  found("inertia", factor(S(0)));
+  found("radius", [&](auto b) { b.radius() = std::numeric_limits<S>::max() / S(4); });
+  found("radius", [&](auto b) { b.radius() = std::numeric_limits<S>::min(); });
+  // The factor is what was written, not the inertia that it makes.
+  found("inertiaFactor", factor(nan));
+  found("inertiaFactor", factor(S(-1)));
+  found("inertiaFactor", factor(S(0)));
 
   Body<S> tracer = sampleBody<S>();
   tracer.mass = S(0);
@@ -326,7 +329,7 @@ TEMPLATE_TEST_CASE("bodies: adopts a storage with bodies in it", "[bodies]", SoA
     storage.at(fields::InertiaFactor{}, 2) = -0.4;
     CHECK(messageOf<std::invalid_argument>([&] {
             Bodies<double, TestType>{storage};
-          }).find("inertia of body 2") != std::string::npos);
+          }).find("inertiaFactor of body 2 is -0.4") != std::string::npos);
   }
 }
 

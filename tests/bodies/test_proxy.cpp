@@ -191,7 +191,8 @@ TEMPLATE_TEST_CASE("proxy: an inertia is kept where m r^2 itself leaves the scal
     CHECK(bodies[0].load().inertia == body.inertia);
   }
   Body<S> body = sampleBody<S>();
-  body.radius = std::ldexp(S(1), -e);
+  body.mass = std::ldexp(S(1), -e);
+  body.radius = std::ldexp(S(1), -e / 2);
   body.inertia = S(1);  // k itself is too large a number, which is said and not stored
   Bodies<S> bodies;
   CHECK(messageOf<std::invalid_argument>([&] { bodies.add(body); }).find("inertia of body 0") !=

@@ -349,6 +349,18 @@ TEST_CASE("The turn has no step where its series takes over") {
   }
 }
 
+// Seen to fail: the square of the angle was infinite, and its cosine not a number.
+TEST_CASE("A turn too fast for its square is a turn, one too fast for a number is none") {
+  const Quaternion<double> q(Eigen::AngleAxisd(0.7, Vector3<double>(1, 2, 2) / 3.0));
+  const Vector3<double> w(3e200, 0.0, -4e200);
+  const Quaternion<double> got = rotated(q, w, 2.0);
+  CHECK(std::abs(got.norm() - 1.0) < 1e-15);
+  // The digits of so many radians are lost, their axis is not.
+  CHECK(std::abs((got * q.conjugate()).vec().dot(Vector3<double>(0.8, 0.0, 0.6))) < 1e-15);
+  CHECK(std::abs((got * q.conjugate()).vec().y()) < 1e-15);
+  CHECK(rotated(q, Vector3<double>(1e300, 1e300, 0.0), 1e10).coeffs() == q.coeffs());
+}
+
 TEST_CASE("A spinning body keeps a unit orientation through a million steps") {
   Quaternion<double> q = Quaternion<double>::Identity();
   const Vector3<double> w(0.3, -1.1, 0.8);

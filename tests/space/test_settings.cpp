@@ -239,6 +239,13 @@ TEST_CASE("A number above zero that is too small is told the least one") {
   CHECK_THROWS_WITH(space.setTimeStep(0), ContainsSubstring("finite, > 0") && !ContainsSubstring("at least"));
 }
 
+// Seen to fail: minTimeStep compared with steps below zero, too, of which 0 is "at most timeStep" for none.
+TEST_CASE("A step below zero is at fault alone") {
+  Space<double> space{Config{}};
+  CHECK_THROWS_WITH(space.setTimeStep(-1),
+                    ContainsSubstring("timeStep is -1;") && !ContainsSubstring("minTimeStep"));
+}
+
 TEST_CASE("Every setting is visited once, with a name and a unit") {
   const Config config;
   std::vector<std::string> names;

@@ -51,7 +51,11 @@ class Bodies {
   /// range; then the storage's memory was not written to
   explicit Bodies(Storage storage) : storage_(std::move(storage)) {
     for (std::size_t i = 0; i < size(); ++i) {
-      validate(adopted(i), "body " + std::to_string(i));
+      const std::string who = "body " + std::to_string(i);
+      validate(adopted(i), who);
+      if (const Scalar k = storage_.at(fields::InertiaFactor{}, i); !(k == Scalar(0))) {
+        checkFactor(k, who);
+      }
     }
     for (; nextId_ < size(); ++nextId_) {
       const auto i = static_cast<std::size_t>(nextId_);
@@ -229,10 +233,11 @@ class Bodies {
     const bool good = isFinite(body.position()) && isFinite(body.velocity()) &&
                       isFinite(body.angularVelocity()) && isFinite(m) && isFinite(r) && m >= Scalar(0) &&
                       r >= Scalar(0) && (m > Scalar(0) || r == Scalar(0) || body.isFixed()) &&
-                      isFinite(q_sq) && q_sq > Scalar(0) && isFinite(k) && k > Scalar(0);
+                      detail::hasSquare(r) && isFinite(q_sq) && q_sq > Scalar(0) && isFinite(k) &&
+                      k > Scalar(0);
     if (!good) {
       const std::string who = "body " + std::to_string(toInteger(body.id()));
-      validate(body.load(), who);
+      validate(loadUnblamed(i), who);
       checkFactor(k, who);
     }
   }
@@ -248,7 +253,8 @@ class Bodies {
       const Tile r = tile(fields::Radius{});
       const Tile k = tile(fields::InertiaFactor{});
       Tile q_sq = tile(fields::Orientation{}, 3).square();
-      Tile size = m + r + k;
+      const Tile r_sq = r.square();
+      Tile size = m + Scalar(16) * r_sq + k;
       for (std::size_t c = 0; c < 3; ++c) {
         size += (tile(fields::Position{}, c).abs() + tile(fields::Velocity{}, c).abs()) +
                 tile(fields::AngularVelocity{}, c).abs();
@@ -258,7 +264,8 @@ class Bodies {
       for (std::size_t lane = 0; lane < std::min(detail::tileWidth, end - i); ++lane) {
         const auto at = static_cast<Eigen::Index>(lane);
         if (!(size[at] <= std::numeric_limits<Scalar>::max() && m[at] >= Scalar(0) && r[at] >= Scalar(0) &&
-              (m[at] > Scalar(0) || r[at] == Scalar(0)) && k[at] > Scalar(0) && q_sq[at] > Scalar(0))) {
+              (r[at] == Scalar(0) || (m[at] > Scalar(0) && r_sq[at] >= std::numeric_limits<Scalar>::min())) &&
+              k[at] > Scalar(0) && q_sq[at] > Scalar(0))) {
           validateOne(i + lane);
         }
       }
@@ -271,15 +278,21 @@ class Bodies {
     }
   }
 
+  /// Body i without an inertia that a factor out of range makes: the factor is at fault, not the inertia.
+  Body<Scalar> loadUnblamed(std::size_t i) const {
+    Body<Scalar> body = (*this)[i].load();
+    if (const Scalar k = storage_.at(fields::InertiaFactor{}, i); !isFinite(k) || !(k > Scalar(0))) {
+      body.inertia.reset();
+    }
+    return body;
+  }
+
   /// Body i of a storage that was handed in, zeros of new storage filled in.
   Body<Scalar> adopted(std::size_t i) const {
-    Body<Scalar> body = (*this)[i].load();
+    Body<Scalar> body = loadUnblamed(i);
     if (body.orientation.coeffs() ==
         Quaternion<Scalar>(Scalar(0), Scalar(0), Scalar(0), Scalar(0)).coeffs()) {
       body.orientation = Quaternion<Scalar>::Identity();
-    }
-    if (Scalar(storage_.at(fields::InertiaFactor{}, i)) == Scalar(0)) {
-      body.inertia.reset();
     }
     return body;
   }

@@ -6,6 +6,8 @@
 #include <gravel/bodies/fields.hpp>
 #include <gravel/core/check.hpp>
 
+#include <cmath>
+#include <limits>
 #include <optional>
 
 namespace gravel {
@@ -18,7 +20,8 @@ struct Body {
   Vector3<Scalar> angularVelocity = Vector3<Scalar>::Zero();        ///< [rad s^-1], axes of space
   Quaternion<Scalar> orientation = Quaternion<Scalar>::Identity();  ///< normalised when added
   Scalar mass = Scalar(1);          ///< [kg] >= 0; 0 only for a point (radius 0) or a fixed body
-  Scalar radius = Scalar(0);        ///< [m] >= 0; one of radius 0 touches spheres alone: no point, no plane
+  Scalar radius = Scalar(0);        ///< [m] 0, or > 0 with a square that neither under- nor overflows; one of
+                                    ///< radius 0 touches spheres alone: no point, no plane
   bool fixed = false;               ///< never moves, nor turns, whatever its velocities; its mass still pulls
   std::optional<Scalar> inertia{};  ///< [kg m^2] > 0; without it a homogeneous sphere's 2/5 m r^2
   MaterialId material = defaultMaterial;
@@ -36,6 +39,17 @@ template <Real Scalar>
 inline Scalar inertiaFactor(const Body<Scalar>& body) {
   return body.inertia ? Scalar(*body.inertia / body.mass / body.radius / body.radius)
                       : homogeneousFactor<Scalar>();
+}
+
+/// Whether r^2 and (r1 + r2)^2 are numbers: beyond, a reach is infinite, or a sphere turns too fast to be
+/// told.
+template <Real Scalar>
+inline bool hasSquare(const Scalar& r) {
+  if constexpr (std::is_floating_point_v<Scalar>) {
+    return r == Scalar(0) || (r * r >= std::numeric_limits<Scalar>::min() && isFinite(Scalar(16) * (r * r)));
+  } else {
+    return true;
+  }
 }
 
 }  // namespace detail
@@ -65,6 +79,14 @@ void validate(const Body<Scalar>& body, const std::string& who) {
   }
   real("mass", body.mass, detail::nonNegative<Scalar>());
   real("radius", body.radius, detail::nonNegative<Scalar>());
+  if constexpr (std::is_floating_point_v<Scalar>) {
+    if (!detail::hasSquare(body.radius)) {
+      const Scalar low = std::sqrt(std::numeric_limits<Scalar>::min());
+      const Scalar high = std::sqrt(std::numeric_limits<Scalar>::max()) / Scalar(4);
+      detail::refuse("radius of " + who, detail::formatReal(body.radius),
+                     "0, or " + detail::formatReal(low) + " to " + detail::formatReal(high));
+    }
+  }
   if (body.mass == Scalar(0) && body.radius > Scalar(0) && !body.fixed) {
     detail::refuse("mass of " + who, "0", "> 0 for a movable body with a radius (a tracer has radius 0)");
   }

@@ -18,7 +18,16 @@ Quaternion<Scalar> rotated(const Quaternion<Scalar>& q, const Vector3<Scalar>& w
   const Scalar angle_sq = half_turn.squaredNorm();
   Quaternion<Scalar> turn;
   if (angle_sq > Scalar(1e-8)) {
-    const Scalar angle = sqrt(angle_sq);
+    Scalar angle = sqrt(angle_sq);
+    if constexpr (std::is_floating_point_v<Scalar>) {
+      if (!isFinite(angle)) {  // the square alone, unless w h is not finite either
+        const Scalar largest = half_turn.cwiseAbs().maxCoeff();
+        angle = largest * sqrt(Vector3<Scalar>(half_turn / largest).squaredNorm());
+        if (!isFinite(angle)) {
+          return q;
+        }
+      }
+    }
     turn.w() = cos(angle);
     turn.vec() = half_turn * Scalar(sin(angle) / angle);
   } else {  // series to x^4, exact to 1e-26

@@ -8,6 +8,7 @@
 #include <gravel/dynamics/kepler.hpp>
 
 #include <algorithm>
+#include <numeric>
 #include <vector>
 
 namespace gravel {
@@ -60,28 +61,36 @@ class WisdomHolman {
   const Compensation<Scalar>& lost() const { return lost_; }
   Compensation<Scalar>& lost() { return lost_; }
 
-  /// Finds centre and order. Part of advance(), with its errors.
+  /// \throws std::invalid_argument if a body is fixed, or none has a mass
   template <class Layout>
-  void prepare(const Bodies<Scalar, Layout>& bodies) {
-    const std::size_t n = bodies.size();
-    order_.resize(n);
-    for (std::size_t i = 0; i < n; ++i) {
-      order_[i] = i;
+  static void check(const Bodies<Scalar, Layout>& bodies) {
+    bool heavy = false;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      heavy = heavy || Scalar(bodies.masses()[i]) > Scalar(0);
       if (bodies[i].isFixed()) {
         detail::refuse(
             "body " + std::to_string(toInteger(bodies[i].id())) + " with the integrator WisdomHolman",
             "fixed", "bodies that move");
       }
     }
+    if (!heavy) {
+      detail::refuse("largest mass with the integrator WisdomHolman", "0", "> 0: the centre has mass");
+    }
+  }
+
+  /// Finds centre and order. Part of advance(), with its errors.
+  template <class Layout>
+  void prepare(const Bodies<Scalar, Layout>& bodies) {
+    check(bodies);
+    const std::size_t n = bodies.size();
+    order_.resize(n);
+    std::iota(order_.begin(), order_.end(), std::size_t{0});
     std::sort(order_.begin(), order_.end(), [&](std::size_t a, std::size_t b) {
       return toInteger(bodies[a].id()) < toInteger(bodies[b].id());
     });
     const auto heaviest = std::max_element(order_.begin(), order_.end(), [&](std::size_t a, std::size_t b) {
       return Scalar(bodies.masses()[a]) < Scalar(bodies.masses()[b]);
     });
-    if (heaviest == order_.end() || !(Scalar(bodies.masses()[*heaviest]) > Scalar(0))) {
-      detail::refuse("largest mass with the integrator WisdomHolman", "0", "> 0: the centre has mass");
-    }
     std::rotate(order_.begin(), heaviest, heaviest + 1);
     mass_.resize(n);
     share_.resize(n);

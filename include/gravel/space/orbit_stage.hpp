@@ -24,7 +24,7 @@ class OrbitStage {
   static bool moves(IntegratorKind kind) { return traitsOf(kind).stages.empty(); }
 
   /// \throws std::invalid_argument if bodies may touch something, or the domain has images, or a force's rate
-  ///   of change is needed and not known
+  ///   of change is needed and not known, or there is no centre that moves
   static void check(IntegratorKind kind, const Bodies& bodies, const ContactStage<Scalar, Layout>& contact,
                     const ForceStage<Scalar, Layout>& force) {
     if (!moves(kind)) {
@@ -40,6 +40,9 @@ class OrbitStage {
     if (kind == IntegratorKind::Hermite4 && force.hook) {
       detail::refuse("user's own force with the " + who, "set",
                      "none: the method needs how forces change with time, which is known of gravity alone");
+    }
+    if (kind == IntegratorKind::WisdomHolman && !bodies.empty()) {
+      WisdomHolman<Scalar>::check(bodies);
     }
     for (std::size_t i = 0; bodies.size() > 1 && i < bodies.size(); ++i) {
       if (Scalar(bodies.radii()[i]) > Scalar(0)) {

@@ -149,7 +149,7 @@ void SimulationConfig<Scalar>::validate() const {
       }
     }
   });
-  if (isFinite(minTimeStep) && isFinite(timeStep) && minTimeStep > timeStep) {
+  if (isFinite(minTimeStep) && isFinite(timeStep) && timeStep > Scalar(0) && minTimeStep > timeStep) {
     fault("minTimeStep", detail::formatReal(minTimeStep), "at most timeStep");
   }
   if (contactIterations == 0) {

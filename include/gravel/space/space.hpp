@@ -137,6 +137,8 @@ class Space : public Settings<Scalar> {
   /// \throws std::invalid_argument naming body and field if a value is not finite or out of range; nothing
   /// has moved then
   void computeDynamics(std::size_t iteration);
+  /// Looks at all that the next step looks at before anything moves. \throws std::invalid_argument as above
+  void check() const;
   /// Steps until `time` [s] exactly; the last step is shortened. \throws std::invalid_argument for a time
   /// before now or not finite
   void advanceTo(Scalar time);

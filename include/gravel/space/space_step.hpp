@@ -115,14 +115,19 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration, const Sc
   profiler_.repeatSkips(more);
 }
 
-/// Checks all bodies; then forces, contacts and the step of the present places, if a body, its place, mass,
-/// radius or inertia was changed, or it became fixed or free, since they were found.
 template <Real Scalar, class Layout>
-void Space<Scalar, Layout>::prepare() {
+void Space<Scalar, Layout>::check() const {
   bodies_.validateAll();
   contact_.materials.check(bodies_);
   contact_.checkSizes(bodies_);
   orbits_.check(this->config_.integrator, bodies_, contact_, force_);
+}
+
+/// Checks all bodies; then forces, contacts and the step of the present places, if a body, its place, mass,
+/// radius or inertia was changed, or it became fixed or free, since they were found.
+template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::prepare() {
+  check();
   wakeTheChanged();
   contact_.setIdle(false);  // until fallAsleep() has looked at those that came or woke
   while (!forcesValid_ || placesChanged()) {

@@ -40,7 +40,8 @@ inline S nearestInteger(const S& x) {
 /// A periodic box is [-L/2, L/2) in each axis. In the shear-periodic box x points outward, y along the orbit;
 /// the unperturbed flow is v_y = -(3/2) Omega x, so the image one box further out in x lags by the sheared
 /// offset (3/2) Omega Lx t in y and by (3/2) Omega Lx in v_y (Wisdom & Tremaine 1988, AJ 95, 925).
-/// Bodies must be smaller than half a box: of each pair only the nearest image is looked at.
+/// Bodies must be smaller than half a box, and go less than half of it in a step: of each pair only the image
+/// that is nearest where a step begins is looked at.
 template <Real S>
 class Domain {
  public:
