@@ -193,8 +193,7 @@ class ContactStage {
     }
   }
 
-  /// The bodies stand in a new order: contacts and impacts know theirs by id. Those of bodies that are gone
-  /// stay as they are.
+  /// The bodies stand in a new order, and contacts and impacts know theirs by id; those of the gone stay.
   void renumber(const Bodies& bodies);
 
   /// Impulses of all solves of the step [N s], in the order of contacts(). A contact that ended in a drift is
@@ -205,7 +204,6 @@ class ContactStage {
   const char* reasonToSkip(const Bodies& bodies) const;
 
   // Of bodies that sleep: contact_stage_sleep.hpp.
-
   /// Nothing that contacts can move is awake: there is no search.
   void setIdle(bool idle) { idle_ = idle; }
   bool isIdle() const { return idle_; }

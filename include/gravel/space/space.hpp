@@ -139,8 +139,8 @@ class Space : public Settings<Scalar> {
   void computeDynamics(std::size_t iteration);
   /// Looks at all that the next step looks at before anything moves. \throws std::invalid_argument as above
   void check() const;
-  /// Steps until `time` [s] exactly; the last step is shortened. \throws std::invalid_argument for a time
-  /// before now or not finite
+  /// Steps until `time` [s] exactly; the last two are shortened alike. \throws std::invalid_argument for a
+  /// time before now or not finite
   void advanceTo(Scalar time);
   Scalar time() const { return time_; }
   std::size_t steps() const { return steps_; }
