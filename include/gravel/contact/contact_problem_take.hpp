@@ -235,11 +235,13 @@ S ContactProblem<S>::rebound(const Taking<B>& taking, const Group& group, std::s
                              const Vector3<S>& n, const S& v_n, const S& allowed, S pull) {
   const std::uint32_t k = group.row[lane];
   const S speed = detail::sizeOf<S>(v_n);
-  const auto accelerationAt = [&](std::uint32_t slot) {
-    return Base::accelerationOf(taking.source, taking.colouring, slot);
+  const auto between = [&](auto&& at) {
+    return S(n.dot(Vector3<S>(at(group.slot2[lane]) - at(group.slot1[lane]))));
   };
-  const S a_n = n.dot(Vector3<S>(accelerationAt(group.slot2[lane]) - accelerationAt(group.slot1[lane])));
-  pull = std::max<S>(pull, S(2) * detail::sizeOf<S>(a_n));
+  const S a_n = between(
+      [&](std::uint32_t slot) { return Base::accelerationOf(taking.source, taking.colouring, slot); });
+  const S b_n = between([&](std::uint32_t slot) { return Base::bendAt(taking.colouring, slot); });
+  pull = std::max<S>(pull, S(2) * std::max<S>(detail::sizeOf<S>(a_n), detail::sizeOf<S>(a_n + b_n)));
   const bool fast = speed > speedIn(S(taking.settings.restitutionThreshold + pull * taking.dt));
   const bool impact = v_n < S(0) && fast && speed > allowed;
   rests_[k] = fast ? RowRest::Not : rests_[k];

@@ -49,7 +49,8 @@ struct Impact {
   bool decided = false;  ///< by somebody else's outcome: the two take no notice of each other in this step
 };
 
-/// A body that began to turn otherwise inside the step.
+/// A body that began to turn otherwise inside the step. Spins are those with which it would have to begin the
+/// step to turn so at that time: in a frame that turns they turn on the way.
 template <Real Scalar>
 struct TurnChange {
   std::uint32_t body;
@@ -95,8 +96,8 @@ struct FlightFromStart {
 };
 
 /// How bodies drift: straight on. A course tells the mean velocity of body i over the step, x + v h being the
-/// place at its end, and the acceleration that bends its path; and deals a blow so that the same drift ends
-/// where the body is afterwards.
+/// place at its end, the acceleration that bends its path, and how spins turn; and deals a blow so that the
+/// same drift ends where the body is afterwards.
 template <Real S>
 struct StraightCourse {
   template <class B>
@@ -112,6 +113,11 @@ struct StraightCourse {
   Vector3<S> velocityAt(const B& bodies, std::size_t i, const S& t, const S& h) const {
     return velocity(bodies, i) + acceleration(bodies, i) * (t - h / S(2));
   }
+  /// Spin at t [s] of what begins the step with spin w, and with which it begins to have w at t.
+  static const Vector3<S>& spinAt(const Vector3<S>& w, const S&) { return w; }
+  static const Vector3<S>& spinAtStart(const Vector3<S>& w, const S&) { return w; }
+  /// What is added to spins for those by which orientations turn over a step, but for a turn of the frame.
+  static Vector3<S> frameSpin() { return Vector3<S>::Zero(); }
   /// \param strokes changes of velocity [m s^-1] one after another, each to be multiplied by `share`
   /// \param t [s] since the start of the step
   template <class B>

@@ -248,10 +248,8 @@ class ImpactEvents : private detail::ImpactForecast<S> {
       const S q2 = boundary ? S(0) : S(one.r / (one.r + two.r));
       const S turnMobility = share.first * one.spin * q1 * q1 + share.second * two.spin * q2 * q2;
       if (turnMobility > S(0)) {
-        const Vector3<S> s1 = one.r * Vector3<S>(bodies.angularVelocities()[event.first]);
-        const Vector3<S> s2 = boundary
-                                  ? Vector3<S>(Vector3<S>::Zero())
-                                  : Vector3<S>(two.r * Vector3<S>(bodies.angularVelocities()[event.second]));
+        const Vector3<S> s1 = one.r * scene.spin(event.first, t);
+        const Vector3<S> s2 = boundary ? Vector3<S>(Vector3<S>::Zero()) : two.r * scene.spin(event.second, t);
         const Vector3<S> rho = q2 * s2 - q1 * s1;
         l = resistTurning<S>(Vector3<S>(rho / -turnMobility), n, dv_n, material.rollingFriction,
                              material.spinningFriction);
@@ -292,25 +290,29 @@ class ImpactEvents : private detail::ImpactForecast<S> {
       return;
     }
     const Vector3<S> nothing = Vector3<S>::Zero();
-    const Vector3<S> before = scene.bodies.angularVelocities()[i];
+    const Vector3<S> before = scene.spin(i, t);
     const S moment = S(scene.bodies.inertiaFactors()[i]) * side.mass * side.r * side.r;
     report.restitutionLoss -=
         side.mass * Vector3<S>(v - side.v).dot(Vector3<S>(Vector3<S>(v + side.v) / S(2) - side.supported));
     report.frictionLoss -= moment * Vector3<S>(w - before).dot(Vector3<S>(w + before)) / S(2);
     scene.course.push(scene.bodies, i, S(1), {Vector3<S>(v - side.v), nothing, nothing}, t);
-    scene.bodies.angularVelocities()[i] = w;
-    turns_.push_back({i, t, before, w});
+    turn(scene, i, Vector3<S>(scene.course.spinAtStart(w, t)), t);
   }
 
   template <class Scene>
-  void twist(const Scene& scene, std::uint32_t i, const S& mobility, const Vector3<S>& turn, const S& t) {
+  void twist(const Scene& scene, std::uint32_t i, const S& mobility, const Vector3<S>& stroke, const S& t) {
     const S r = scene.bodies.radii()[i];
-    if (mobility == S(0) || !(r > S(0)) || turn == Vector3<S>::Zero()) {
-      return;
+    if (!(mobility == S(0)) && r > S(0) && !(stroke == Vector3<S>::Zero())) {
+      const Vector3<S> before = scene.bodies.angularVelocities()[i];
+      turn(scene, i, Vector3<S>(before - (mobility / r) * scene.course.spinAtStart(stroke, t)), t);
     }
-    const Vector3<S> before = scene.bodies.angularVelocities()[i];
-    scene.bodies.angularVelocities()[i] -= (mobility / r) * turn;
-    turns_.push_back({i, t, before, Vector3<S>(scene.bodies.angularVelocities()[i])});
+  }
+
+  /// From t on the body turns as if it had begun the step with spin w.
+  template <class Scene>
+  void turn(const Scene& scene, std::uint32_t i, const Vector3<S>& w, const S& t) {
+    turns_.push_back({i, t, Vector3<S>(scene.bodies.angularVelocities()[i]), w});
+    scene.bodies.angularVelocities()[i] = w;
   }
 };
 

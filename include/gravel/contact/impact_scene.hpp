@@ -56,6 +56,11 @@ struct ImpactScene {
       return fall;
     }
   }
+  /// At t [s] since the start of the step; what nothing moves spins as it does in the frame.
+  Vector3<S> spin(std::uint32_t i, const S& t) const {
+    const Vector3<S> w = bodies.angularVelocities()[i];
+    return isMovable(bodies, i) ? Vector3<S>(course.spinAt(w, t)) : w;
+  }
   /// What support makes of the velocity of a movable body at t [s] since the start of the step.
   Vector3<S> velocityBySupport(std::uint32_t i, const S& t) const {
     if constexpr (!std::is_same_v<Support, NoSupport>) {
@@ -92,7 +97,7 @@ struct ImpactSide {
       side.supported = scene.velocityBySupport(i, t);
       side.v = Vector3<S>(scene.course.velocityAt(bodies, i, t, scene.settings.h)) + side.supported;
     }
-    side.s = r * Vector3<S>(bodies.angularVelocities()[i]);
+    side.s = r * scene.spin(i, t);
     side.r = r;
     side.c = r > S(0) ? S(arm / r) : S(0);
     side.spin = side.movable && r > S(0) && k > S(0) ? S(S(1) / k) : S(0);

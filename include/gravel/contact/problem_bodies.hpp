@@ -172,11 +172,11 @@ class ProblemBodies {
     }
   }
 
-  /// [m s^-2], with what its frame adds; zero of what nothing moves.
+  /// [m s^-2] by forces, without what its frame adds; zero of what nothing moves.
   template <class B>
   Vector3<S> accelerationOf(const B& source, const ContactColoring& colouring, std::size_t slot) const {
     return colouring.movable(static_cast<std::uint32_t>(slot))
-               ? Vector3<S>(source.accelerations()[colouring.bodies()[slot]] + bendAt(colouring, slot))
+               ? Vector3<S>(source.accelerations()[colouring.bodies()[slot]])
                : Vector3<S>(Vector3<S>::Zero());
   }
   Vector3<S> bendAt(const ContactColoring& colouring, std::size_t slot) const {
@@ -196,7 +196,13 @@ class ProblemBodies {
     b.v = source.velocities()[i];
     b.s =
         friction ? Vector3<S>(r * Vector3<S>(source.angularVelocities()[i])) : Vector3<S>(Vector3<S>::Zero());
-    initial[slot].fall = safeNorm(accelerationOf(source, colouring, slot));
+    // Kicks are by forces alone, drifts bend by what the frame adds: where the two nearly cancel, as in what
+    // hardly holds together in the tide, each brings together what rests, more than their sum does.
+    const Vector3<S> a = accelerationOf(source, colouring, slot);
+    initial[slot].fall = safeNorm(a);
+    if (!bend_.empty()) {
+      initial[slot].fall = std::max<S>(initial[slot].fall, safeNorm(Vector3<S>(a + bendAt(colouring, slot))));
+    }
     initial[slot].radius = r;
     b.inverseMass = movable ? S(source.masses()[i]) : S(0);
     b.spin = movable && r > S(0) && k > S(0) ? S(1) / k : S(0);

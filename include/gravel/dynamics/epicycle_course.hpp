@@ -14,7 +14,7 @@ namespace gravel {
 /// The course of bodies in Hill's frame, for `ImpactEvents`. Over a step the epicycle is taken as the
 /// parabola with its ends and its change of velocity, which is right to O(h^3). The drift is linear in (x,
 /// v), so that what a blow dv at t changes at the start of the step is the epicycle back over t of (0, dv),
-/// exactly.
+/// exactly. Spins turn with -Omega on the way: what a blow changes is turned back over t, too.
 template <Real Scalar>
 class EpicycleCourse {
  public:
@@ -43,6 +43,19 @@ class EpicycleCourse {
     Epicycle<Scalar>(frame_, t).increments(bodies.positions()[i], bodies.velocities()[i], dx, dv);
     return bodies.velocities()[i] + dv + bodies.accelerations()[i] * (t - h / Scalar(2));
   }
+
+  /// As Epicycle::turn.
+  Vector3<Scalar> spinAt(const Vector3<Scalar>& w, const Scalar& t) const {
+    using std::cos;
+    using std::sin;
+    const Scalar angle = frame_.omega * t;
+    const Scalar c(cos(angle)), s(sin(angle));
+    return {c * w[0] + s * w[1], c * w[1] - s * w[0], w[2]};
+  }
+  Vector3<Scalar> spinAtStart(const Vector3<Scalar>& w, const Scalar& t) const {
+    return spinAt(w, Scalar(-t));
+  }
+  Vector3<Scalar> frameSpin() const { return {Scalar(0), Scalar(0), frame_.omega}; }
 
   template <class B>
   void push(B& bodies, std::size_t i, const Scalar& share, const std::array<Vector3<Scalar>, 3>& strokes,

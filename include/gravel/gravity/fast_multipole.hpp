@@ -145,7 +145,7 @@ class FastMultipole {
     }
     // Accelerations in a periodic system are what is left of forces that cancel.
     const F safety = F(plan.safety) * F(images_.isOpen() ? 1.0 : 1.7);
-    strength_.compute(tree_, F(F(tolerance_) / safety), plan.order, images_, farImages_);
+    strength_.compute(tree_, F(F(tolerance_) / safety), plan.order, F(softening_sq), images_, farImages_);
     using Walk = detail::MultipoleWalk<S, F, Terms>;
     Walk first(tree_, moments, images_.shifts(), limits, softening_sq, fields_);
     const std::size_t share = std::max<std::size_t>(256, tree_.size() / 64);

@@ -13,7 +13,8 @@ namespace gravel::detail {
 /// groups of at most 64 bodies, of large systems 256, feel at their centre from other cells, and images of
 /// cells, as points. An error of that size at all of them has a relative rms of `share`. Accelerations below
 /// a thousandth of the mean count as that much; in a periodic system, where they may cancel everywhere, the
-/// mean counts as at least a tenth of the pull of one body at the mean distance.
+/// mean counts as at least a tenth of the pull of one body at the mean distance. All pulls are softened: a
+/// knot within the softening length would else count with what it pulled unsoftened, and lift the mean.
 ///
 /// Then lowered for the sake of bodies at a rim in groups whose masses are uneven, so that none errs by more
 /// than 1.3 share of its own acceleration, or of a tenth of the mean: see RimStrength.
@@ -24,8 +25,9 @@ class FieldStrength {
  public:
   /// \param order of the expansions
   /// \param field of the far images, which have been gathered unless `images` is open
-  void compute(BodyTree<S, F>& tree, const F& share, int order, const PeriodicImages<S, F>& images,
-               const ImageField<S, F>& field) {
+  void compute(BodyTree<S, F>& tree, const F& share, int order, const F& softening_sq,
+               const PeriodicImages<S, F>& images, const ImageField<S, F>& field) {
+    softening_sq_ = softening_sq;
     const std::size_t n = tree.cells.size();
     groupSize_ = static_cast<std::uint32_t>(std::clamp<std::size_t>(tree.size() / 256, 64, 256));
     groups_.clear();
@@ -46,7 +48,7 @@ class FieldStrength {
                 [&](std::size_t g) { isUneven_[g] = Rims::isUneven(tree, tree.cells[groups_[g]]) ? 1 : 0; });
     const bool hasRims = std::find(isUneven_.begin(), isUneven_.end(), 1) != isUneven_.end();
     if (hasRims) {
-      rims_.begin(tree, order);
+      rims_.begin(tree, order, softening_sq);
     }
     parallelForChunks(groups_.size(), 64, [&](std::size_t begin, std::size_t end) {
       std::vector<ImageCell> todo;
@@ -86,11 +88,14 @@ class FieldStrength {
 
  private:
   /// Of a body of mean mass, bodies taken to fill the sphere around the root.
-  static F pullAtMeanDistance(const BodyTree<S, F>& tree) {
+  F pullAtMeanDistance(const BodyTree<S, F>& tree) const {
+    using std::sqrt;
     const TreeCell<F>& root = tree.cells[0];
-    const double n = static_cast<double>(tree.size());
+    const F distance_per_r = F(std::cbrt(1 / static_cast<double>(tree.size())));
     const F r = F(root.radius);
-    return r > F(0) ? F(root.mass / (r * r) * F(std::cbrt(1 / n))) : F(0);
+    const F d = r * distance_per_r;
+    const F softer = d > F(0) ? F(d * d / (d * d + softening_sq_)) : F(0);
+    return r > F(0) ? F(root.mass / (r * r) * distance_per_r * softer * sqrt(softer)) : F(0);
   }
 
   using Rims = RimStrength<S, F>;
@@ -116,7 +121,7 @@ class FieldStrength {
         }
         continue;
       }
-      const F s = r_sq + (isFar && r_sq > near ? F(0) : F(own + near));
+      const F s = r_sq + softening_sq_ + (isFar && r_sq > near ? F(0) : F(own + near));
       const F w = s > F(0) ? F(source.mass / (s * sqrt(s))) : F(0);
       sum += w * d;
       if (around != nullptr && isFar && r_sq > F(4) * near) {
@@ -162,6 +167,7 @@ class FieldStrength {
   }
 
   std::uint32_t groupSize_ = 64;
+  F softening_sq_ = F(0);
   std::vector<std::uint32_t> groups_;
   std::vector<std::uint8_t> isBelow_;
   std::vector<std::uint8_t> isUneven_;  ///< of each group

@@ -20,7 +20,7 @@ struct GroupField {
     near.clear();
   }
 
-  /// \param d from the centre to a mass m at the distance r. \param w m / r^3. \param v m / r^5
+  /// \param d from the centre to a mass m. \param w m / s^(3/2), s = r^2 + eps^2. \param v m / s^(5/2)
   void addFar(const Vector3<F>& d, const F& w, const F& v) {
     far += w * d;
     tide += d * (F(F(3) * v) * d).transpose();
@@ -51,8 +51,9 @@ class RimStrength {
   }
 
   /// \param order of the expansions
-  void begin(const BodyTree<S, F>& tree, int order) {
+  void begin(const BodyTree<S, F>& tree, int order, const F& softening_sq) {
     order_ = order;
+    softening_sq_ = softening_sq;
     rim_ = F(1.5 * std::pow(1.5, -1.0 / order) - 0.5);
     strength_.assign(tree.size(), F(-1));
     parent_.assign(tree.cells.size(), 0);
@@ -145,8 +146,9 @@ class RimStrength {
       const Vector3<S>& shift = shifts[from.image];
       const Vector3<F> place = x - Vector3<F>(F(shift[0]), F(shift[1]), F(shift[2]));
       const Vector3<F> d = source.centre - place;
-      const F s = d.squaredNorm();
-      if (s > F(source.radius) * F(source.radius)) {
+      const F r_sq = d.squaredNorm();
+      if (r_sq > F(source.radius) * F(source.radius)) {
+        const F s = r_sq + softening_sq_;
         sum += F(source.mass / (s * sqrt(s))) * d;
       } else if (source.isLeaf()) {
         addBodies(tree, source, place, lanes);
@@ -159,9 +161,10 @@ class RimStrength {
     return F((sum + Vector3<F>(lanes[0].sum(), lanes[1].sum(), lanes[2].sum())).norm());
   }
 
-  static void addBodies(const BodyTree<S, F>& tree, const TreeCell<F>& leaf, const Vector3<F>& x,
-                        Lanes (&sum)[3]) {
+  void addBodies(const BodyTree<S, F>& tree, const TreeCell<F>& leaf, const Vector3<F>& x,
+                 Lanes (&sum)[3]) const {
     using Row = Eigen::Map<const Eigen::Array<S, static_cast<int>(width), 1>>;
+    const F least = softening_sq_ + F(1e-60);  // the body is at no distance from itself
     for (std::uint32_t i = leaf.first; i < leaf.last; i += width) {
       const Lanes dx = Row(&tree.x[i]).template cast<F>() - x[0];
       const Lanes dy = Row(&tree.y[i]).template cast<F>() - x[1];
@@ -170,7 +173,7 @@ class RimStrength {
       for (std::uint32_t k = leaf.last - i; k < width; ++k) {
         w[k] = F(0);
       }
-      const Lanes s = dx * dx + dy * dy + dz * dz + F(1e-60);  // the body is at no distance from itself
+      const Lanes s = dx * dx + dy * dy + dz * dz + least;
       w /= s * s.sqrt();
       sum[0] += w * dx;
       sum[1] += w * dy;
@@ -180,6 +183,7 @@ class RimStrength {
 
   int order_ = 0;
   F rim_ = F(0);
+  F softening_sq_ = F(0);
   std::vector<std::uint32_t> parent_;
   std::vector<F> strength_;  ///< of each row; below 0 where it was not looked at
 };

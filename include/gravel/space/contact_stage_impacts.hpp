@@ -99,13 +99,12 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
                             const Vector3<Scalar>& v1, const Vector3<Scalar>& v2,
                             const Vector3<Scalar>& v_rel) {
       const auto partner = [&](std::uint32_t i, std::uint64_t id, const Vector3<Scalar>& v) {
-        return typename Collision<Scalar>::Partner{BodyId{id},
-                                                   bodies.masses()[i],
-                                                   bodies.radii()[i],
-                                                   !detail::isMovable(bodies, i),
-                                                   MaterialId{bodies.materials()[i]},
-                                                   v,
-                                                   Vector3<Scalar>(bodies.angularVelocities()[i])};
+        const Vector3<Scalar> start = bodies.angularVelocities()[i];
+        const bool movable = detail::isMovable(bodies, i);
+        const Vector3<Scalar> w = movable ? Vector3<Scalar>(course.spinAt(start, impact.time)) : start;
+        return typename Collision<Scalar>::Partner{
+            BodyId{id}, bodies.masses()[i], bodies.radii()[i], !movable, MaterialId{bodies.materials()[i]}, v,
+            w};
       };
       return detail::outcomeOf(
           collisionHook, Collision<Scalar>{Scalar(time + impact.time), partner(impact.first, impact.key1, v1),
@@ -119,10 +118,13 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
                              course, NoDecision{}, support);
   }
   neighbours_.add(impacts_.candidatesAdded(), bodies.ids());
+  const Vector3<Scalar> frame = course.frameSpin();
   for (const TurnChange<Scalar>& turn : impacts_.turns()) {
     // The drift turns the body by the new spin for all of h.
     auto&& q = bodies[turn.body].orientation();
-    q = rotated(rotated(Quaternion<Scalar>(q), turn.before, turn.time), turn.after, Scalar(-turn.time));
+    const Vector3<Scalar> before = turn.before + frame;
+    const Vector3<Scalar> after = turn.after + frame;
+    q = rotated(rotated(Quaternion<Scalar>(q), before, turn.time), after, Scalar(-turn.time));
   }
   report_.impacts += blows.impacts;
   report_.postponed += blows.postponed;
