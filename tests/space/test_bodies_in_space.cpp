@@ -152,6 +152,62 @@ TEST_CASE("Fixed bodies stay, whatever pulls, hits or overlaps them") {
   CHECK(space.contactCount() == 0);  // two immovable bodies make none
 }
 
+// Against the same scene without them: what rests on it, rolls, hits it with spin, and merges with it; steps,
+// parts and the ledger. Seen to fail: read by the solver of contacts (a ball at rest was dragged to 0.6 m/s,
+// the ledger went from 9.8 J to 13.0 J), by impacts as a spin, and by each of the sums.
+TEST_CASE("Velocities written to a fixed body count as zero") {
+  for (const int kind : {0, 1, 2, 3, 4}) {
+    SimulationConfig<double> config = quiet();
+    config.coeffFriction = config.coeffStaticFriction = 0.5;
+    config.rollingFriction = 0.01;
+    config.tangentialRestitution = 0.3;
+    config.timeStep = 5e-3;
+    config.contactSubsteps = kind == 1 ? 0 : 1;
+    config.adaptiveTimeStep = kind == 2 || kind == 3;
+    config.G = kind == 3 ? 0.1 : 0.0;
+    config.linearDamping = config.angularDamping = kind == 4 ? 0.1 : 0.0;
+    const auto scene = [&](const Vec& v, const Vec& w) {
+      Space<double> space(config);
+      space.setUniformField({0, 0, -9.8});
+      Body<double> rock = at({0, 0, 0});
+      rock.fixed = true;
+      const BodyId top = space.addBody(rock);
+      rock.position[0] = 10;
+      const BodyId target = space.addBody(rock);
+      space.addBody(at({0, 0, 1}));
+      Body<double> thrown = at({10.3, 0, 1.2});
+      thrown.velocity = {-1, 0.5, -3};
+      space.addBody(thrown);
+      for (int i = 0; i < 50; ++i) {
+        for (const BodyId id : {top, target}) {
+          space.body(id).velocity() = v;
+          space.body(id).angularVelocity() = w;
+        }
+        space.computeDynamics(0);
+      }
+      return space;
+    };
+    const Space<double> none = scene(Vec::Zero(), Vec::Zero());
+    Space<double> some = scene({2, 1, -1}, {3, 4, 5});
+    CAPTURE(kind);
+    REQUIRE(none.body(3).angularVelocity().norm() > 0.1);  // it has hit the other one
+    for (const std::size_t i : {2U, 3U}) {
+      CHECK(some.body(i).position() == none.body(i).position());
+      CHECK(some.body(i).velocity() == none.body(i).velocity());
+      CHECK(some.body(i).angularVelocity() == none.body(i).angularVelocity());
+    }
+    CHECK(some.time() == none.time());
+    CHECK(some.conserved().momentum == none.conserved().momentum);
+    CHECK(some.conserved().angularMomentum == none.conserved().angularMomentum);
+    CHECK(some.energyLedger().damping == none.energyLedger().damping);
+    CHECK(some.energyLedger().total() == none.energyLedger().total());
+    const double total = some.energyLedger().total();
+    some.removeBody(some.body(0).id());
+    CHECK_THAT(some.energyLedger().total(), WithinAbs(total, 1e-13));
+    CHECK(some.body(0).position() == none.body(3).position());
+  }
+}
+
 TEST_CASE("A fixed body pulls, and is hit as a wall") {
   SimulationConfig<double> config = quiet();
   config.G = 1.0;

@@ -249,10 +249,9 @@ class ImpactEvents : private detail::ImpactForecast<S> {
       const S q2 = boundary ? S(0) : S(one.r / (one.r + two.r));
       const S turnMobility = share.first * one.spin * q1 * q1 + share.second * two.spin * q2 * q2;
       if (turnMobility > S(0)) {
-        const Vector3<S> s1 = one.r * Vector3<S>(bodies.angularVelocities()[event.first]);
-        const Vector3<S> s2 = boundary
-                                  ? Vector3<S>(Vector3<S>::Zero())
-                                  : Vector3<S>(two.r * Vector3<S>(bodies.angularVelocities()[event.second]));
+        const Vector3<S> s1 = one.r * detail::spinOf(bodies, event.first);
+        const Vector3<S> s2 = boundary ? Vector3<S>(Vector3<S>::Zero())
+                                       : Vector3<S>(two.r * detail::spinOf(bodies, event.second));
         const Vector3<S> rho = q2 * s2 - q1 * s1;
         l = resistTurning<S>(Vector3<S>(rho / -turnMobility), n, dv_n, material.rollingFriction,
                              material.spinningFriction);

@@ -82,7 +82,7 @@ struct ImpactSide {
       side.supported = scene.velocityBySupport(i, t);
       side.v = Vector3<S>(scene.course.velocityAt(bodies, i, t, scene.settings.h)) + side.supported;
     }
-    side.s = r * Vector3<S>(bodies.angularVelocities()[i]);
+    side.s = r * spinOf(bodies, i);
     side.r = r;
     side.c = r > S(0) ? S(arm / r) : S(0);
     side.spin = side.movable && r > S(0) && k > S(0) ? S(S(1) / k) : S(0);

@@ -193,9 +193,8 @@ class ProblemBodies {
     const bool movable = colouring.movable(static_cast<std::uint32_t>(slot));
     const S r = source.radii()[i];
     const S k = source.inertiaFactors()[i];
-    b.v = source.velocities()[i];
-    b.s =
-        friction ? Vector3<S>(r * Vector3<S>(source.angularVelocities()[i])) : Vector3<S>(Vector3<S>::Zero());
+    b.v = velocityOf(source, i);
+    b.s = friction ? Vector3<S>(r * spinOf(source, i)) : Vector3<S>(Vector3<S>::Zero());
     initial[slot].fall = safeNorm(accelerationOf(source, colouring, slot));
     initial[slot].radius = r;
     b.inverseMass = movable ? S(source.masses()[i]) : S(0);

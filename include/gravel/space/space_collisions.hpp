@@ -96,8 +96,8 @@ void Space<Scalar, Layout>::merge(BodyId stays, BodyId goes, const Scalar& time)
   const std::size_t j = bodies_.indexOf(goes);
   const auto motionOf = [&](std::size_t k) {
     const BodyProxy one = bodies_[k];
-    return (Scalar(one.mass()) * Scalar(one.velocity().squaredNorm()) +
-            one.inertia() * Scalar(one.angularVelocity().squaredNorm())) /
+    return (Scalar(one.mass()) * Scalar(one.countingVelocity().squaredNorm()) +
+            one.inertia() * Scalar(one.countingSpin().squaredNorm())) /
            Scalar(2);
   };
   const Body<Scalar> a = bodies_[i].load();
