@@ -178,6 +178,7 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
   contact_.endPart(start, last);
   mergeCollided(merges, Scalar(time_ + end));
   if (!last && !merges.empty()) {
+    contact_.endMerged(bodies_, merges);
     force_.evaluate(bodies_, getG(), this->config_.softening, contact_.domain, Scalar(time_ + end),
                     profiler_);
   }
