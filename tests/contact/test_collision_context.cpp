@@ -120,6 +120,21 @@ TEST_CASE("a fixed body and a tracer are moved by nothing") {
   CHECK(Vector3<double>(bodies[1].position()) == Vector3<double>(0.9, 0, 0));
 }
 
+// Seen to fail: both velocities were read as they stood.
+TEST_CASE("what is written to a fixed body as velocity and spin counts as zero") {
+  auto bodies = pairAt<double>({0, 0, 0}, {0.9, 0, 0}, 0.5, 0.5);
+  bodies[1].velocity() = Vector3<double>(-1, 0, 0);
+  bodies[0].setFixed(true);
+  bodies[0].velocity() = Vector3<double>(5, 0, 0);
+  bodies[0].angularVelocity() = Vector3<double>(0, 0, 5);
+  auto ctx = contextOf<double>(bodies);
+  REQUIRE(ctx);
+  CHECK(ctx->normalVelocity() == -1.0);
+  CHECK(ctx->slip() == Vector3<double>::Zero());
+  applyNormalImpulse(*ctx, 1.0);
+  CHECK(bodies[1].velocity()[0] == 1.0);
+}
+
 TEST_CASE("separate() opens the overlap by its factor and keeps centre of mass and velocities") {
   for (const double factor : {0.2, 1.0}) {
     auto bodies = pairAt<double>({0, 0, 0}, {1.5, 0, 0}, 1, 1);

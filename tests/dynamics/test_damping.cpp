@@ -76,6 +76,15 @@ TEST_CASE("The energy that damping reports is the energy that is gone") {
   CHECK_THAT(lost, WithinRel(before - after, 1e-13));  // sums of 5000 terms of one sign
 }
 
+// Seen to fail: 0.14 J were taken out of a body that has none.
+TEST_CASE("A fixed body has no motion to damp, whatever is written to it") {
+  auto bodies = moving<double, SoA>(1);
+  bodies[0].setFixed(true);
+  bodies[0].velocity() = Vector3<double>(1, 0, 0);
+  bodies[0].angularVelocity() = Vector3<double>(1, 0, 0);
+  CHECK(damp(bodies, 0.8, 0.3, 0.5) == 0.0);
+}
+
 TEST_CASE("Rates of zero change no bit, and take nothing") {
   auto bodies = moving<double>(5);
   const auto same = moving<double>(5);

@@ -1,5 +1,6 @@
 #include "support/catch.hpp"
 #include "support/space.hpp"
+#include "support/temporary_file.hpp"
 #include <gravel/space/space.hpp>
 
 #include <limits>
@@ -150,6 +151,62 @@ TEST_CASE("Fixed bodies stay, whatever pulls, hits or overlaps them") {
   }
   CHECK(std::get<0>(space.calculateSystemEnergy()) == 0.0);
   CHECK(space.contactCount() == 0);  // two immovable bodies make none
+}
+
+// Against the same scene without them: what rests on it, rolls, hits it with spin, and merges with it; steps,
+// parts and the ledger. Seen to fail: read by the solver of contacts (a ball at rest was dragged to 0.6 m/s,
+// the ledger went from 9.8 J to 13.0 J), by impacts as a spin, and by each of the sums.
+TEST_CASE("Velocities written to a fixed body count as zero") {
+  for (const int kind : {0, 1, 2, 3, 4}) {
+    SimulationConfig<double> config = quiet();
+    config.coeffFriction = config.coeffStaticFriction = 0.5;
+    config.rollingFriction = 0.01;
+    config.tangentialRestitution = 0.3;
+    config.timeStep = 5e-3;
+    config.contactSubsteps = kind == 1 ? 0 : 1;
+    config.adaptiveTimeStep = kind == 2 || kind == 3;
+    config.G = kind == 3 ? 0.1 : 0.0;
+    config.linearDamping = config.angularDamping = kind == 4 ? 0.1 : 0.0;
+    const auto scene = [&](const Vec& v, const Vec& w) {
+      Space<double> space(config);
+      space.setUniformField({0, 0, -9.8});
+      Body<double> rock = at({0, 0, 0});
+      rock.fixed = true;
+      const BodyId top = space.addBody(rock);
+      rock.position[0] = 10;
+      const BodyId target = space.addBody(rock);
+      space.addBody(at({0, 0, 1}));
+      Body<double> thrown = at({10.3, 0, 1.2});
+      thrown.velocity = {-1, 0.5, -3};
+      space.addBody(thrown);
+      for (int i = 0; i < 50; ++i) {
+        for (const BodyId id : {top, target}) {
+          space.body(id).velocity() = v;
+          space.body(id).angularVelocity() = w;
+        }
+        space.computeDynamics(0);
+      }
+      return space;
+    };
+    const Space<double> none = scene(Vec::Zero(), Vec::Zero());
+    Space<double> some = scene({2, 1, -1}, {3, 4, 5});
+    CAPTURE(kind);
+    REQUIRE(none.body(3).angularVelocity().norm() > 0.1);  // it has hit the other one
+    for (const std::size_t i : {2U, 3U}) {
+      CHECK(some.body(i).position() == none.body(i).position());
+      CHECK(some.body(i).velocity() == none.body(i).velocity());
+      CHECK(some.body(i).angularVelocity() == none.body(i).angularVelocity());
+    }
+    CHECK(some.time() == none.time());
+    CHECK(some.conserved().momentum == none.conserved().momentum);
+    CHECK(some.conserved().angularMomentum == none.conserved().angularMomentum);
+    CHECK(some.energyLedger().damping == none.energyLedger().damping);
+    CHECK(some.energyLedger().total() == none.energyLedger().total());
+    const double total = some.energyLedger().total();
+    some.removeBody(some.body(0).id());
+    CHECK_THAT(some.energyLedger().total(), WithinAbs(total, 1e-13));
+    CHECK(some.body(0).position() == none.body(3).position());
+  }
 }
 
 TEST_CASE("A fixed body pulls, and is hit as a wall") {
@@ -347,6 +404,99 @@ TEST_CASE("What touched in the last step is told of the bodies that are there, w
   CHECK_THAT(space.supportedWeight().load[2], WithinRel(-4.0, config.contactTolerance));
   const double blow = 0.5 / space.getPreviousTimeStep();
   CHECK_THAT(space.contactVirial().contacts, WithinRel(3.0 + blow, config.contactTolerance));
+}
+
+// Seen to fail: contacts() and impacts() went on naming the indices of before, that of the last body among
+// them.
+TEST_CASE(
+    "Contacts, impacts and their impulses follow bodies that are removed, in any order and through a file") {
+  const TemporaryFile file("removal");
+  const auto scene = [] {
+    SimulationConfig<double> config = quiet();
+    config.coeffRestitution = 0.0;
+    Space<double> space(config);
+    space.setUniformField({0, 0, -1});
+    space.addPlane({0, 0, 1}, 0.0);
+    for (int k = 0; k < 6; ++k) {
+      Body<double> one = at({3.0 * k, 0, 0.5});
+      one.mass = 1.0 + k;
+      space.addBody(one);
+    }
+    for (int k = 0; k < 3; ++k) {
+      Body<double> one = at({3.0 * k, 10, 5});
+      one.velocity[0] = 1.0;
+      space.addBody(one);
+      one.position[0] += 1.001;
+      one.velocity[0] = 0.0;
+      space.addBody(one);
+    }
+    space.computeDynamics(0);
+    return space;
+  };
+  const auto isTold = [](const Space<double>& space, std::size_t onFloor, std::size_t blows) {
+    REQUIRE(space.contacts().size() == onFloor + blows);  // those that met go on together
+    REQUIRE(space.impacts().size() == blows);
+    CHECK(space.contactCount() == onFloor + blows);
+    const auto impulses = space.contactImpulses();
+    REQUIRE(impulses.size() == onFloor + blows);
+    for (std::size_t k = 0; k < impulses.size(); ++k) {
+      const Contact<double>& c = space.contacts()[k];
+      CHECK(toInteger(space.body(c.first).id()) == c.key1);
+      if (c.second == staticPartner) {
+        CHECK_THAT(impulses[k].normal,
+                   WithinRel(space.body(c.first).mass() * space.getPreviousTimeStep(), 1e-9));
+      } else {
+        CHECK(toInteger(space.body(c.second).id()) == c.key2);
+      }
+    }
+    for (const Impact<double>& blow : space.impacts()) {
+      CHECK(toInteger(space.body(blow.first).id()) == blow.key1);
+      CHECK(toInteger(space.body(blow.second).id()) == blow.key2);
+    }
+  };
+  Space<double> space = scene();
+  Space<double> unseen = scene();
+  isTold(space, 6, 3);
+  const auto remove = [&](std::uint64_t id) {
+    space.removeBody(BodyId{id});
+    unseen.removeBody(BodyId{id});
+  };
+  remove(0);  // the last one, which was struck, takes its index
+  isTold(space, 5, 3);
+  remove(6);
+  isTold(space, 5, 2);
+  remove(11);
+  remove(3);
+  isTold(space, 4, 1);
+  space.reorderBodies();
+  unseen.reorderBodies();
+  isTold(space, 4, 1);
+  space.save(file.path());
+  Space<double> again;
+  again.restore(file.path());
+  CHECK(again.contacts().size() == 5);
+  for (const Contact<double>& c : again.contacts()) {
+    CHECK(toInteger(again.body(c.first).id()) == c.key1);
+  }
+  const BodyId late = space.addBody(at({20, 0, 0.5}));
+  unseen.addBody(at({20, 0, 0.5}));
+  again.addBody(at({20, 0, 0.5}));
+  isTold(space, 4, 1);
+  // Who looked changes nothing.
+  for (int k = 0; k < 5; ++k) {
+    for (Space<double>* one : {&space, &unseen, &again}) {
+      one->computeDynamics(0);
+    }
+  }
+  CHECK(space.contacts().size() == 6);
+  for (std::size_t i = 0; i < space.n(); ++i) {
+    for (const Space<double>* one : {&unseen, &again}) {
+      const BodyId id = space.body(i).id();
+      CHECK(one->body(id).position() == space.body(i).position());
+      CHECK(one->body(id).velocity() == space.body(i).velocity());
+    }
+  }
+  CHECK(toInteger(late) == 12);
 }
 
 TEST_CASE("A sphere that would touch its own image is refused before anything moves") {

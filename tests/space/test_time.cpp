@@ -51,7 +51,7 @@ TEST_CASE("advanceTo ends at the time asked for exactly, and leaves the step as 
   CHECK(space.steps() == 13);
   CHECK(space.getTimeStep() == 0.1);
   CHECK_THAT(space.getPreviousTimeStep(), WithinAbs(0.075, 1e-15));  // the last two alike
-  space.advanceTo(1.25);  // there already
+  space.advanceTo(1.25);                                             // there already
   CHECK(space.steps() == 13);
   CHECK_THROWS_WITH(space.advanceTo(1.0), ContainsSubstring("1.25"));
   CHECK_THROWS_AS(space.advanceTo(std::numeric_limits<double>::quiet_NaN()), std::invalid_argument);

@@ -64,6 +64,14 @@ class BasicBodyProxy {
     return isFixed() || !(moment > Scalar(0)) ? Scalar(0) : Scalar(Scalar(1) / moment);
   }
 
+  /// [m s^-1], [rad s^-1] as they count: what is written to a fixed body does not move it.
+  Vector3<Scalar> countingVelocity() const {
+    return isFixed() ? Vector3<Scalar>(Vector3<Scalar>::Zero()) : Vector3<Scalar>(velocity());
+  }
+  Vector3<Scalar> countingSpin() const {
+    return isFixed() ? Vector3<Scalar>(Vector3<Scalar>::Zero()) : Vector3<Scalar>(angularVelocity());
+  }
+
   void setMaterial(MaterialId material) const requires(!IsConst) {
     at(fields::Material{}) = static_cast<std::uint32_t>(material);
   }

@@ -27,18 +27,17 @@ struct CollisionContext {
 
   /// [m s^-1] of body 2 relative to body 1 at the contact, now; along the normal and across it.
   Vector3<S> relativeVelocity() const {
-    const Vector3<S> v_rel = Vector3<S>(body2.velocity()) + drift - Vector3<S>(body1.velocity());
-    const Vector3<S> spin =
-        arm1 * Vector3<S>(body1.angularVelocity()) + arm2 * Vector3<S>(body2.angularVelocity());
-    return v_rel - spin.cross(normal);
+    const Vector3<S> spin = arm1 * body1.countingSpin() + arm2 * body2.countingSpin();
+    return centreVelocity() - spin.cross(normal);
   }
-  S normalVelocity() const {
-    return normal.dot(Vector3<S>(Vector3<S>(body2.velocity()) + drift - Vector3<S>(body1.velocity())));
-  }
+  S normalVelocity() const { return normal.dot(centreVelocity()); }
   Vector3<S> slip() const {
     const Vector3<S> u = relativeVelocity();
     return u - normal.dot(u) * normal;
   }
+
+ private:
+  Vector3<S> centreVelocity() const { return body2.countingVelocity() + drift - body1.countingVelocity(); }
 };
 
 namespace detail {

@@ -61,6 +61,20 @@ bool isMovable(const B& bodies, std::size_t i) {
   return (bodies.flags()[i] & heldFlags) == 0 && bodies.masses()[i] > S(0);
 }
 
+/// [m s^-1] as it counts: what is written to a fixed body does not move it.
+template <class B>
+auto velocityOf(const B& bodies, std::size_t i) {
+  using V = Vector3<std::remove_cvref_t<decltype(bodies.masses()[i])>>;
+  return (bodies.flags()[i] & heldFlags) == 0 ? V(bodies.velocities()[i]) : V(V::Zero());
+}
+
+/// [rad s^-1], likewise.
+template <class B>
+auto spinOf(const B& bodies, std::size_t i) {
+  using V = Vector3<std::remove_cvref_t<decltype(bodies.masses()[i])>>;
+  return (bodies.flags()[i] & heldFlags) == 0 ? V(bodies.angularVelocities()[i]) : V(V::Zero());
+}
+
 /// True for a point without mass, which feels gravity and touches nothing.
 template <class B>
 bool isTracer(const B& bodies, std::size_t i) {

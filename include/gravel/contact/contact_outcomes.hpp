@@ -37,8 +37,8 @@ ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, con
                                           bodies.radii()[i],
                                           !detail::isMovable(bodies, i),
                                           MaterialId{bodies.materials()[i]},
-                                          Vector3<S>(bodies.velocities()[i]),
-                                          Vector3<S>(bodies.angularVelocities()[i])};
+                                          detail::velocityOf(bodies, i),
+                                          detail::spinOf(bodies, i)};
   };
   const auto fall = [&](std::uint32_t i) {
     return detail::isMovable(bodies, i) ? Vector3<S>(bodies.accelerations()[i])
@@ -49,8 +49,8 @@ ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, con
         std::find(decided.begin(), decided.end(), std::pair(c.key1, c.key2)) != decided.end()) {
       continue;
     }
-    const Vector3<S> v_rel = Vector3<S>(bodies.velocities()[c.second]) + contacts.drift(c) -
-                             Vector3<S>(bodies.velocities()[c.first]);
+    const Vector3<S> v_rel =
+        detail::velocityOf(bodies, c.second) + contacts.drift(c) - detail::velocityOf(bodies, c.first);
     const S approach = -c.normal.dot(v_rel);
     const S a_n = c.normal.dot(Vector3<S>(fall(c.second) - fall(c.first)));
     if (!(approach > threshold + S(2) * (a_n < S(0) ? S(-a_n) : a_n) * h)) {

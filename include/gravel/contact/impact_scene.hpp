@@ -58,7 +58,7 @@ struct ImpactScene {
   }
   /// At t [s] since the start of the step; what nothing moves spins as it does in the frame.
   Vector3<S> spin(std::uint32_t i, const S& t) const {
-    const Vector3<S> w = bodies.angularVelocities()[i];
+    const Vector3<S> w = spinOf(bodies, i);
     return isMovable(bodies, i) ? Vector3<S>(course.spinAt(w, t)) : w;
   }
   /// What support makes of the velocity of a movable body at t [s] since the start of the step.

@@ -150,8 +150,8 @@ class PositionalCorrection {
     parallelFor(n, chunk, [&](std::size_t slot) {
       const bool movable = colouring.movable(static_cast<std::uint32_t>(slot));
       const std::uint32_t i = colouring.bodies()[slot];
-      shifts_[slot] = {Vector3<S>::Zero(), movable ? S(bodies.masses()[i]) : S(0), bodies.velocities()[i],
-                       bodies.radii()[i]};
+      shifts_[slot] = {Vector3<S>::Zero(), movable ? S(bodies.masses()[i]) : S(0),
+                       detail::velocityOf(bodies, i), bodies.radii()[i]};
     });
     shifts_[n] = {Vector3<S>::Zero(), S(0), Vector3<S>::Zero(), S(0)};
   }

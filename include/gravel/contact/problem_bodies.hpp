@@ -193,9 +193,8 @@ class ProblemBodies {
     const bool movable = colouring.movable(static_cast<std::uint32_t>(slot));
     const S r = source.radii()[i];
     const S k = source.inertiaFactors()[i];
-    b.v = source.velocities()[i];
-    b.s =
-        friction ? Vector3<S>(r * Vector3<S>(source.angularVelocities()[i])) : Vector3<S>(Vector3<S>::Zero());
+    b.v = velocityOf(source, i);
+    b.s = friction ? Vector3<S>(r * spinOf(source, i)) : Vector3<S>(Vector3<S>::Zero());
     // Kicks are by forces alone, drifts bend by what the frame adds: where the two nearly cancel, as in what
     // hardly holds together in the tide, each brings together what rests, more than their sum does.
     const Vector3<S> a = accelerationOf(source, colouring, slot);

@@ -20,6 +20,9 @@ Scalar damp(Bodies<Scalar, Layout>& bodies, const Scalar& c, const Scalar& c_w, 
     Scalar lost(0);
     for (std::size_t i = begin; i < end; ++i) {
       const auto body = bodies[i];
+      if (body.isFixed()) {
+        continue;
+      }
       const Scalar v_sq = body.velocity().squaredNorm();
       const Scalar w_sq = body.angularVelocity().squaredNorm();
       body.velocity() *= f;

@@ -47,7 +47,7 @@ class EncounterTable {
     for (Eigen::Index i = 0; i < n_; ++i) {
       const auto body = bodies[static_cast<std::size_t>(i)];
       const Vector3<S> x = body.position().template cast<S>();
-      const Vector3<S> v = body.velocity().template cast<S>();
+      const Vector3<S> v = body.countingVelocity().template cast<S>();
       x_[i] = x[0], y_[i] = x[1], z_[i] = x[2];
       u_[i] = v[0], v_[i] = v[1], w_[i] = v[2];
       m_[i] = S(body.mass());
@@ -108,7 +108,7 @@ void lookAtLikeliest(const Bodies<Scalar, Layout>& bodies, const S& G, const S& 
   for (std::size_t i = 0; i < n; ++i) {
     const S m = S(bodies.masses()[i]);
     mass += m;
-    v_cm += bodies.velocities()[i].template cast<S>() * m;
+    v_cm += bodies[i].countingVelocity().template cast<S>() * m;
     a_cm += bodies.accelerations()[i].template cast<S>() * m;
   }
   if (mass > S(0)) {

@@ -70,7 +70,7 @@ class GaussRadau15 {
     using std::sqrt;
     Scalar step = h;
     for (std::size_t i = 0; i < bodies.size(); ++i) {
-      const Scalar v_sq = bodies.velocities()[i].squaredNorm();
+      const Scalar v_sq = bodies[i].countingVelocity().squaredNorm();
       const Scalar a_sq = bodies.accelerations()[i].squaredNorm();
       if (v_sq > Scalar(0) && a_sq > Scalar(0)) {
         step = std::min<Scalar>(step, sqrt(Scalar(v_sq / a_sq)) / Scalar(100));

@@ -26,8 +26,8 @@ ConservedQuantities<Scalar> conservedQuantities(const Bodies<Scalar, Layout>& bo
       const auto body = bodies[i];
       const Scalar m = body.mass();
       const Vector3<Scalar> x = body.position();
-      const Vector3<Scalar> p = body.velocity() * m;
-      const Vector3<Scalar> spin = body.angularVelocity() * body.inertia();
+      const Vector3<Scalar> p = body.countingVelocity() * m;
+      const Vector3<Scalar> spin = body.countingSpin() * body.inertia();
       part[0] += m;
       part.template segment<3>(1) += p.array();
       part.template segment<3>(4) += Vector3<Scalar>(x.cross(p) + spin).array();

@@ -31,7 +31,8 @@ struct EnergyLedger {
   Scalar total() const { return mechanical() + dissipated(); }
 };
 
-/// Translational and rotational kinetic energy [J]. O(N); the same bits for any number of threads.
+/// Translational and rotational kinetic energy [J]; fixed bodies have none. O(N); the same bits for any
+/// number of threads.
 template <Real Scalar, class Layout>
 void addKineticEnergy(const Bodies<Scalar, Layout>& bodies, EnergyLedger<Scalar>& ledger) {
   using Sum = Eigen::Array<Scalar, 2, 1>;
@@ -40,8 +41,8 @@ void addKineticEnergy(const Bodies<Scalar, Layout>& bodies, EnergyLedger<Scalar>
     Sum part = Sum::Zero();
     for (std::size_t i = begin; i < end; ++i) {
       const auto body = bodies[i];
-      part[0] += half * Scalar(body.mass()) * Scalar(body.velocity().squaredNorm());
-      part[1] += half * body.inertia() * Scalar(body.angularVelocity().squaredNorm());
+      part[0] += half * Scalar(body.mass()) * Scalar(body.countingVelocity().squaredNorm());
+      part[1] += half * body.inertia() * Scalar(body.countingSpin().squaredNorm());
     }
     return part;
   });

@@ -31,8 +31,20 @@ class ContactStage {
   MaterialTable<Scalar> materials;
   CollisionHook<Scalar> collisionHook;
 
-  const ContactList<Scalar>& contacts() const { return contacts_; }
   const ContactReport<Scalar>& report() const { return report_; }
+
+  // What touched in the last step, of the bodies that are there, by the indices of now:
+  // contact_stage_reports.hpp.
+
+  /// At its end. O(contacts) once after bodies came, went or merged; like impacts() it holds until then.
+  const ContactList<Scalar>& contacts(const Bodies& bodies) const;
+  /// Of all solves of the step [N s], in the order of contacts(). A contact that ended in a drift is not
+  /// among them. O(contacts).
+  std::vector<ContactImpulse<Scalar>> impulses(const Bodies& bodies) const;
+  /// The blows inside it, in the order in which they were dealt.
+  const std::vector<Impact<Scalar>>& impacts(const Bodies& bodies) const;
+  /// Pairs: contacts at its end, and impacts of others.
+  std::size_t touches(const Bodies& bodies) const;
 
   /// Brings bodies back into the domain. \return the energy that they have more there [J]
   /// \param field [m s^-2]
@@ -63,23 +75,12 @@ class ContactStage {
   /// Pairs of ids that a user lets merge after impacts inside the last part of the step.
   const std::vector<std::pair<std::uint64_t, std::uint64_t>>& merges() const { return impacts_.merges(); }
 
-  /// Pairs that touched in the last step: contacts at its end, and impacts of others.
-  std::size_t touches() const;
-
-  /// All that touched in the last step: contacts() with impulses(), and after them the impacts inside it.
+  /// All that touched: contacts() with impulses(), and after them impacts().
   struct Touches {
     ContactList<Scalar> contacts;
     std::vector<ContactImpulse<Scalar>> impulses;
-
-    /// By the indices of now, without those of bodies that are gone since.
-    void keepPresent(const Bodies& bodies);
   };
-  Touches allTouches() const;
-
-  /// The blows inside the last step, in the order in which they were dealt.
-  const std::vector<Impact<Scalar>>& impacts() const {
-    return record_.hasParts() ? record_.impacts() : impacts_.impacts();
-  }
+  Touches allTouches(const Bodies& bodies) const;
 
   /// Shrinks overlaps by moving bodies, and renews the geometry of the contacts, so that impulses act where
   /// the bodies are.
@@ -109,26 +110,7 @@ class ContactStage {
 
   /// Energy that moving bodies apart took [J]: F.d by the forces at the new places, exact to the square of
   /// the displacement d, and what it took of their motion.
-  Scalar separationWork(const ForceStage<Scalar, Layout>& force, const Bodies& bodies) const {
-    Scalar work = separationLoss_;
-    if (moved_) {
-      const HillFrame<Scalar> frame(domain);
-      const std::vector<Displacement<Scalar>>& all = solver_.displacements();
-      work += orderedSum(all.size(), 512, Scalar(0), [&](std::size_t begin, std::size_t end) {
-        Scalar sum(0);
-        for (std::size_t k = begin; k < end; ++k) {
-          const Displacement<Scalar>& d = all[k];
-          sum += force.conservativeForce(bodies, d.body).dot(d.shift);
-          if (frame.turns()) {
-            const Vector3<Scalar> x = bodies[d.body].position();
-            sum += Scalar(bodies[d.body].mass()) * (frame.potential(x - d.shift) - frame.potential(x));
-          }
-        }
-        return sum;
-      });
-    }
-    return work;
-  }
+  Scalar separationWork(const ForceStage<Scalar, Layout>& force, const Bodies& bodies) const;
 
   /// Solves all contacts together on the present velocities. Adds to the report of the step.
   /// \param h [s] length of the step \param drifts  the drift of the step follows
@@ -162,13 +144,8 @@ class ContactStage {
     report_.addSolve(half);
   }
 
-  /// Bodies are not those of the contacts any more.
-  void forgetContacts() {
-    impacts_.clear();
-    contacts_.clear();
-    contactsChanged();
-    moved_ = false;
-  }
+  /// Bodies merged, and the step goes on: contacts of these pairs of ids are not what they were.
+  void endMerged(const Bodies& bodies, const std::vector<std::pair<BodyId, BodyId>>& merges);
 
   /// \throws std::invalid_argument for a sphere that would touch its own image
   void checkSizes(const Bodies& bodies) const;
@@ -195,10 +172,6 @@ class ContactStage {
 
   /// The bodies stand in a new order, and contacts and impacts know theirs by id; those of the gone stay.
   void renumber(const Bodies& bodies);
-
-  /// Impulses of all solves of the step [N s], in the order of contacts(). A contact that ended in a drift is
-  /// not among them. O(contacts).
-  std::vector<ContactImpulse<Scalar>> impulses() const;
 
   /// Why nothing can touch, or nullptr.
   const char* reasonToSkip(const Bodies& bodies) const;
@@ -260,7 +233,27 @@ class ContactStage {
     coloured_ = false;
     known_ = false;
     resumed_ = {};
+    present_.revision.reset();
   }
+
+  /// What was found last, whoever is there by now.
+  std::vector<ContactImpulse<Scalar>> impulses() const;
+  std::vector<Impact<Scalar>>& impacts() {
+    return record_.hasParts() ? record_.impacts() : impacts_.impacts();
+  }
+  const std::vector<Impact<Scalar>>& impacts() const {
+    return record_.hasParts() ? record_.impacts() : impacts_.impacts();
+  }
+
+  /// The same of the bodies that are there, where it is not the same: made when somebody looks, since bodies
+  /// may be removed one by one.
+  struct Present {
+    ContactList<Scalar> contacts;
+    std::vector<std::uint32_t> places;  ///< of them in contacts_
+    std::vector<Impact<Scalar>> impacts;
+    std::optional<std::uint64_t> revision;  ///< of the bodies that it is of
+  };
+  const Present& present(const Bodies& bodies) const;
 
   void setDrift(std::size_t plane, const Vector3<Scalar>& drift);
 
@@ -297,6 +290,8 @@ class ContactStage {
   mutable std::vector<ContactKeys> struck_;
   bool searched_ = false;  // neighbours_ hold for the whole drift
   ContactList<Scalar> contacts_;
+  std::uint64_t revision_ = 0;  // of the bodies by whose indices contacts and impacts are
+  mutable Present present_;
   ContactSolver<Scalar> solver_;
   StepRecord<Scalar> record_;
   ContactReport<Scalar> report_;
@@ -316,5 +311,6 @@ class ContactStage {
 
 #include <gravel/space/contact_stage_impacts.hpp>
 #include <gravel/space/contact_stage_planes.hpp>
+#include <gravel/space/contact_stage_reports.hpp>
 #include <gravel/space/contact_stage_search.hpp>
 #include <gravel/space/contact_stage_sleep.hpp>

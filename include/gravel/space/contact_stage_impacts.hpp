@@ -99,7 +99,7 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
                             const Vector3<Scalar>& v1, const Vector3<Scalar>& v2,
                             const Vector3<Scalar>& v_rel) {
       const auto partner = [&](std::uint32_t i, std::uint64_t id, const Vector3<Scalar>& v) {
-        const Vector3<Scalar> start = bodies.angularVelocities()[i];
+        const Vector3<Scalar> start = detail::spinOf(bodies, i);
         const bool movable = detail::isMovable(bodies, i);
         const Vector3<Scalar> w = movable ? Vector3<Scalar>(course.spinAt(start, impact.time)) : start;
         return typename Collision<Scalar>::Partner{

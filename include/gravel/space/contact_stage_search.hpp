@@ -1,7 +1,7 @@
 #pragma once
 
 /// \file
-/// Members of `ContactStage` that look for contacts, and say what touched.
+/// Members of `ContactStage` that look for contacts.
 
 #include <gravel/space/contact_stage.hpp>
 
@@ -28,6 +28,10 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
                                           const Scalar& h, bool goesOn, Profiler& profiler) {
   const bool searched = searched_;
   searched_ = false;
+  if (revision_ != bodies.revision()) {
+    std::erase_if(impacts(), [&](Impact<Scalar>& impact) { return !renumber(bodies, impact); });
+    revision_ = bodies.revision();
+  }
   const char* reason = reasonToSkip(bodies);
   if (reason != nullptr) {
     contacts_.clear();
@@ -72,116 +76,6 @@ void ContactStage<Scalar, Layout>::checkSizes(const Bodies& bodies) const {
                      "at most half an edge of the domain, " + detail::formatReal(most));
     }
   }
-}
-
-template <Real Scalar, class Layout>
-std::size_t ContactStage<Scalar, Layout>::touches() const {
-  std::size_t count = contacts_.size();
-  struck_.clear();
-  for (const Impact<Scalar>& impact : impacts()) {
-    struck_.push_back({impact.key1, impact.key2});
-  }
-  std::sort(struck_.begin(), struck_.end());
-  struck_.erase(std::unique(struck_.begin(), struck_.end()), struck_.end());
-  for (const ContactKeys& keys : struck_) {
-    const auto before = [&](const Contact<Scalar>& c) { return ContactKeys{c.key1, c.key2} < keys; };
-    const auto found = std::partition_point(contacts_.begin(), contacts_.end(), before);
-    count += found == contacts_.end() || ContactKeys{found->key1, found->key2} != keys ? 1U : 0U;
-  }
-  return count;
-}
-
-template <Real Scalar, class Layout>
-void ContactStage<Scalar, Layout>::endPart(const Scalar& start, bool last) {
-  if (!last) {
-    record_.endPart(impacts_.impacts(), start);
-    if (firstActed_) {
-      record_.add(solver_.earlierImpulses(), [&](std::size_t k) { return solver_.earlierKeys(k); });
-      firstActed_ = false;
-    }
-    if (acted_ && !contacts_.empty()) {
-      record_.add(solver_.impulses(), [&](std::size_t k) {
-        return ContactKeys{contacts_[k].key1, contacts_[k].key2};
-      });
-    }
-    impacts_.clear();
-  } else if (record_.hasParts()) {
-    record_.addImpacts(impacts_.impacts(), start);
-  }
-}
-
-template <Real Scalar, class Layout>
-std::vector<ContactImpulse<Scalar>> ContactStage<Scalar, Layout>::impulses() const {
-  std::vector<ContactImpulse<Scalar>> sum = solver_.copyImpulses();
-  sum.resize(contacts_.size());
-  record_.addTo(sum, contacts_);
-  if (firstActed_) {
-    record_.addTo(sum, contacts_, solver_.earlierImpulses(),
-                  [&](std::size_t k) { return solver_.earlierKeys(k); });
-  }
-  return sum;
-}
-
-template <Real Scalar, class Layout>
-auto ContactStage<Scalar, Layout>::allTouches() const -> Touches {
-  Touches all{contacts_, impulses()};
-  for (const Impact<Scalar>& impact : impacts()) {
-    Contact<Scalar> c{};
-    c.first = impact.first;
-    c.second = impact.second;
-    c.key1 = impact.key1;
-    c.key2 = impact.key2;
-    c.normal = impact.normal;
-    c.arm1 = impact.distance;
-    c.gap = c.arm2 = Scalar(0);  // a user's scalar may not begin at zero
-    all.contacts.push_back(c, {});
-    all.impulses.push_back(impact.impulse);
-  }
-  return all;
-}
-
-template <Real Scalar, class Layout>
-template <class Pair>
-bool ContactStage<Scalar, Layout>::renumber(const Bodies& bodies, Pair& pair) {
-  const auto first = bodies.find(BodyId{pair.key1});
-  const bool second = pair.second != staticPartner;
-  const auto other = second ? bodies.find(BodyId{pair.key2}) : first;
-  if (first && other) {
-    pair.first = static_cast<std::uint32_t>(*first);
-    pair.second = second ? static_cast<std::uint32_t>(*other) : staticPartner;
-  }
-  return first && other;
-}
-
-template <Real Scalar, class Layout>
-void ContactStage<Scalar, Layout>::renumber(const Bodies& bodies) {
-  for (Contact<Scalar>& c : contacts_) {
-    (void)renumber(bodies, c);
-  }
-  for (auto* all : {&impacts_.impacts(), &record_.impacts()}) {
-    for (Impact<Scalar>& impact : *all) {
-      (void)renumber(bodies, impact);
-    }
-  }
-  if (coloured_) {
-    resumed_ = solver_.solved();  // the solver counts bodies by ids: it goes on as if nothing had been
-    coloured_ = false;
-  }
-  known_ = false;  // indices are others
-  moved_ = false;
-}
-
-template <Real Scalar, class Layout>
-void ContactStage<Scalar, Layout>::Touches::keepPresent(const Bodies& bodies) {
-  Touches present;
-  for (std::size_t k = 0; k < contacts.size(); ++k) {
-    Contact<Scalar> c = contacts[k];
-    if (renumber(bodies, c)) {
-      present.contacts.push_back(c, {});
-      present.impulses.push_back(impulses[k]);
-    }
-  }
-  *this = std::move(present);
 }
 
 template <Real Scalar, class Layout>

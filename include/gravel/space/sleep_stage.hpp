@@ -70,19 +70,24 @@ class SleepStage {
         follow(bodies);
         any = true;
       }
-      island.state = IslandState::Asleep;
+      // Bodies that touch when forces are found anew may have merged by now.
+      const bool same = detail::asItWas(bodies, island);
+      island.state = same ? IslandState::Asleep : IslandState::Waking;
       for (const RestingBody<Scalar>& member : island.members) {
-        if (!isSlow(bodies[*detail::placeOf(bodies, member)], config)) {
+        if (same && !isSlow(bodies[*detail::placeOf(bodies, member)], config)) {
           island.state = IslandState::Waking;
         }
       }
       for (const RestingBody<Scalar>& member : island.members) {
-        const std::size_t i = *detail::placeOf(bodies, member);
-        slow_[i] = Scalar(0);
+        const auto i = detail::placeOf(bodies, member);
+        if (!i) {
+          continue;
+        }
+        slow_[*i] = Scalar(0);
         if (island.state == IslandState::Waking) {
           continue;
         }
-        const auto body = bodies[i];
+        const auto body = bodies[*i];
         lost += (Scalar(body.mass()) * Scalar(body.velocity().squaredNorm()) +
                  body.inertia() * Scalar(body.angularVelocity().squaredNorm())) /
                 Scalar(2);
@@ -129,10 +134,10 @@ class SleepStage {
     follow(bodies);
     if (!islands_.empty()) {
       number(bodies);
-      for (const Contact<Scalar>& c : contact.contacts()) {
+      for (const Contact<Scalar>& c : contact.contacts(bodies)) {
         rouseByTouch(c);
       }
-      for (const auto& impact : contact.impacts()) {
+      for (const auto& impact : contact.impacts(bodies)) {
         rouseByTouch(impact);
       }
       for (SleepingIsland<Scalar>& island : islands_) {
@@ -149,6 +154,18 @@ class SleepStage {
     }
     if (ready) {
       findTired(bodies, contact, config, h);
+    }
+  }
+
+  /// What has become of these pairs of ids has been slow for no time.
+  void startAnew(const Bodies& bodies, const std::vector<std::pair<BodyId, BodyId>>& merges) {
+    follow(bodies);
+    for (const auto& [one, other] : merges) {
+      for (const BodyId id : {one, other}) {
+        if (const auto i = bodies.find(id)) {
+          slow_[*i] = Scalar(0);
+        }
+      }
     }
   }
 

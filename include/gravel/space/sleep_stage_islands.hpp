@@ -11,7 +11,8 @@ namespace gravel {
 template <Real Scalar, class Layout>
 void SleepStage<Scalar, Layout>::findTired(const Bodies& bodies, const Contacts& contact,
                                            const Config& config, const Scalar& h) {
-  groups_.find(std::span<const Contact<Scalar>>(contact.contacts().contacts), bodies);
+  const ContactList<Scalar>& touching = contact.contacts(bodies);
+  groups_.find(std::span<const Contact<Scalar>>(touching.contacts), bodies);
   std::vector<unsigned char> rests(bodies.size(), 1);
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     if (!detail::isMovable(bodies, i) || slow_[i] < config.sleepTime) {
@@ -35,16 +36,16 @@ void SleepStage<Scalar, Layout>::findTired(const Bodies& bodies, const Contacts&
   if (found.empty()) {
     return;
   }
-  const std::vector<ContactImpulse<Scalar>> impulses = contact.impulses();
+  const std::vector<ContactImpulse<Scalar>> impulses = contact.impulses(bodies);
   std::vector<Vector3<Scalar>> push(found.size(), Vector3<Scalar>::Zero());
-  for (std::size_t k = 0; k < contact.contacts().size(); ++k) {
-    const Contact<Scalar>& c = contact.contacts()[k];
+  for (std::size_t k = 0; k < touching.size(); ++k) {
+    const Contact<Scalar>& c = touching[k];
     const bool firstMoves = detail::isMovable(bodies, c.first);
     const std::uint32_t place = groupAt[groups_.of(firstMoves ? c.first : c.second)];
     if (place == none) {
       continue;
     }
-    found[place].contacts.push_back(c, contact.contacts().surface(c));
+    found[place].contacts.push_back(c, touching.surface(c));
     found[place].impulses.push_back(impulses[k]);
     const Vector3<Scalar> j = impulses[k].normal * c.normal + impulses[k].tangential;
     if (c.second == staticPartner) {

@@ -172,14 +172,15 @@ class Space : public Settings<Scalar> {
   getDataForDisplay() const;
   /// Pairs that touched in the last step: contacts() and impacts(), each pair once. Contacts inside a heap
   /// that sleeps are not among them, here and in contacts(); weights and virials count them.
-  std::size_t contactCount() const { return contact_.touches(); }
+  std::size_t contactCount() const { return contact_.touches(bodies_); }
   /// What the contact solver reached in the last step.
   const ContactReport<Scalar>& contactReport() const { return contact_.report(); }
   /// Contacts of the last step, in the order of ids; the surfaces of a contact c: contacts().material(c).
-  const ContactList<Scalar>& contacts() const { return contact_.contacts(); }
+  /// Those of bodies that were removed or went into others since are not among them, here and in impacts().
+  const ContactList<Scalar>& contacts() const { return contact_.contacts(bodies_); }
   /// Impulses [N s] over the last step, in the order of contacts(). A contact's mean force is its impulse
   /// over getPreviousTimeStep().
-  std::vector<ContactImpulse<Scalar>> contactImpulses() const { return contact_.impulses(); }
+  std::vector<ContactImpulse<Scalar>> contactImpulses() const { return contact_.impulses(bodies_); }
   /// Terms of the virial theorem over the last step: an error of the forces in a whole heap at rest that
   /// needs no reference, see `ContactVirial::residual()`.
   ContactVirial<Scalar> contactVirial() const;
@@ -189,7 +190,7 @@ class Space : public Settings<Scalar> {
   Vector planeForce(std::size_t plane) const;
   /// Blows that were dealt at their own time inside the last step, in their order; their times are those
   /// since its start.
-  const std::vector<Impact<Scalar>>& impacts() const { return contact_.impacts(); }
+  const std::vector<Impact<Scalar>>& impacts() const { return contact_.impacts(bodies_); }
   /// Bodies that touch each body, by index, at the last step.
   std::vector<std::vector<std::size_t>> collisionGraph() const;
   /// Seconds by phase, and what was skipped and why, on standard output.

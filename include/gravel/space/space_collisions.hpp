@@ -23,7 +23,7 @@ auto Space<Scalar, Layout>::decideCollisions(const Scalar& time) -> std::vector<
   }
   const SimulationConfig<Scalar>& c = this->config_;
   const ContactOutcomes<Scalar> ends =
-      decideContacts<Scalar>(contact_.contacts(), bodies_, contact_.collisionHook, time,
+      decideContacts<Scalar>(contacts(), bodies_, contact_.collisionHook, time,
                              std::max(c.restitutionThreshold, c.epsilon), contact_dt_, contact_.merges());
   for (const auto& [id1, id2] : ends.merges) {
     merges.emplace_back(BodyId{id1}, BodyId{id2});
@@ -40,7 +40,7 @@ void Space<Scalar, Layout>::decideTouching() {
     return;
   }
   const ContactOutcomes<Scalar> starts = decideContacts<Scalar>(
-      contact_.contacts(), bodies_, contact_.collisionHook, time_,
+      contacts(), bodies_, contact_.collisionHook, time_,
       std::max<Scalar>(this->config_.restitutionThreshold, this->config_.epsilon), dt_);
   left_.restitution += starts.restitutionLoss;
   left_.friction += starts.frictionLoss;
@@ -86,7 +86,9 @@ void Space<Scalar, Layout>::mergeCollided(const std::vector<std::pair<BodyId, Bo
     heir.emplace(toInteger(goes), stays);
     merge(stays, goes, time);
   }
-  contact_.forgetContacts();
+  if (this->config_.sleepSpeed > Scalar(0)) {
+    sleep_.startAnew(bodies_, merges);
+  }
   forcesValid_ = false;
 }
 
@@ -96,8 +98,8 @@ void Space<Scalar, Layout>::merge(BodyId stays, BodyId goes, const Scalar& time)
   const std::size_t j = bodies_.indexOf(goes);
   const auto motionOf = [&](std::size_t k) {
     const BodyProxy one = bodies_[k];
-    return (Scalar(one.mass()) * Scalar(one.velocity().squaredNorm()) +
-            one.inertia() * Scalar(one.angularVelocity().squaredNorm())) /
+    return (Scalar(one.mass()) * Scalar(one.countingVelocity().squaredNorm()) +
+            one.inertia() * Scalar(one.countingSpin().squaredNorm())) /
            Scalar(2);
   };
   const Body<Scalar> a = bodies_[i].load();

@@ -42,9 +42,8 @@ void Space<Scalar, Layout>::fallAsleep() {
 /// What touches, with what sleeps.
 template <Real Scalar, class Layout>
 auto Space<Scalar, Layout>::allTouches() const -> typename ContactStage<Scalar, Layout>::Touches {
-  auto touches = contact_.allTouches();
+  auto touches = contact_.allTouches(bodies_);
   sleep_.addTouches(bodies_, touches, previous_dt_);
-  touches.keepPresent(bodies_);
   return touches;
 }
 

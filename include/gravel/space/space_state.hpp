@@ -87,8 +87,7 @@ auto Space<Scalar, Layout>::planeForce(std::size_t plane) const -> Vector {
 template <Real Scalar, class Layout>
 std::vector<std::vector<std::size_t>> Space<Scalar, Layout>::collisionGraph() const {
   std::vector<std::vector<std::size_t>> graph(n());
-  auto touches = contact_.allTouches();
-  touches.keepPresent(bodies_);
+  const auto touches = contact_.allTouches(bodies_);
   for (const Contact<Scalar>& c : touches.contacts) {
     if (c.second != staticPartner) {
       std::vector<std::size_t>& partners = graph[c.first];
@@ -268,6 +267,7 @@ void Space<Scalar, Layout>::restore(const std::string& path) {
   left_ = numbers.left;
   steps_ = static_cast<std::size_t>(numbers.steps);
   ledgerOpen_ = numbers.ledgerOpen != 0;
+  contact_.renumber(bodies_);
   rememberPlaces();
   forcesValid_ = numbers.stale == 0;
 }

@@ -77,11 +77,11 @@ std::size_t Space<Scalar, Layout>::chooseParts(const Scalar& h) {
   Scalar rate_sq(0);
   for (const Contact<Scalar>& c : contacts()) {
     const bool boundary = c.second == staticPartner;
-    Vector v = -Vector(bodies_.velocities()[c.first]) + contacts().drift(c);
+    Vector v = contacts().drift(c) - detail::velocityOf(bodies_, c.first);
     Vector a = -Vector(bodies_.accelerations()[c.first]);
     Scalar r = bodies_.radii()[c.first];
     if (!boundary) {
-      v += Vector(bodies_.velocities()[c.second]);
+      v += detail::velocityOf(bodies_, c.second);
       a += Vector(bodies_.accelerations()[c.second]);
       const Scalar r2 = bodies_.radii()[c.second];
       r = r2 > Scalar(0) && (r2 < r || !(r > Scalar(0))) ? r2 : r;
@@ -178,6 +178,7 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
   contact_.endPart(start, last);
   mergeCollided(merges, Scalar(time_ + end));
   if (!last && !merges.empty()) {
+    contact_.endMerged(bodies_, merges);
     force_.evaluate(bodies_, getG(), this->config_.softening, contact_.domain, Scalar(time_ + end),
                     profiler_);
   }

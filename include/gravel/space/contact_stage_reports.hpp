@@ -1,0 +1,194 @@
+#pragma once
+
+/// \file
+/// Members of `ContactStage` that say what touched, and what it took.
+
+#include <gravel/space/contact_stage.hpp>
+
+namespace gravel {
+
+template <Real Scalar, class Layout>
+Scalar ContactStage<Scalar, Layout>::separationWork(const ForceStage<Scalar, Layout>& force,
+                                                    const Bodies& bodies) const {
+  Scalar work = separationLoss_;
+  if (moved_) {
+    const HillFrame<Scalar> frame(domain);
+    const std::vector<Displacement<Scalar>>& all = solver_.displacements();
+    work += orderedSum(all.size(), 512, Scalar(0), [&](std::size_t begin, std::size_t end) {
+      Scalar sum(0);
+      for (std::size_t k = begin; k < end; ++k) {
+        const Displacement<Scalar>& d = all[k];
+        sum += force.conservativeForce(bodies, d.body).dot(d.shift);
+        if (frame.turns()) {
+          const Vector3<Scalar> x = bodies[d.body].position();
+          sum += Scalar(bodies[d.body].mass()) * (frame.potential(x - d.shift) - frame.potential(x));
+        }
+      }
+      return sum;
+    });
+  }
+  return work;
+}
+
+template <Real Scalar, class Layout>
+void ContactStage<Scalar, Layout>::endPart(const Scalar& start, bool last) {
+  if (!last) {
+    record_.endPart(impacts_.impacts(), start);
+    if (firstActed_) {
+      record_.add(solver_.earlierImpulses(), [&](std::size_t k) { return solver_.earlierKeys(k); });
+      firstActed_ = false;
+    }
+    if (acted_ && !contacts_.empty()) {
+      record_.add(solver_.impulses(), [&](std::size_t k) {
+        return ContactKeys{contacts_[k].key1, contacts_[k].key2};
+      });
+    }
+    impacts_.clear();
+  } else if (record_.hasParts()) {
+    record_.addImpacts(impacts_.impacts(), start);
+  }
+}
+
+template <Real Scalar, class Layout>
+std::vector<ContactImpulse<Scalar>> ContactStage<Scalar, Layout>::impulses() const {
+  std::vector<ContactImpulse<Scalar>> sum = solver_.copyImpulses();
+  sum.resize(contacts_.size());
+  record_.addTo(sum, contacts_);
+  if (firstActed_) {
+    record_.addTo(sum, contacts_, solver_.earlierImpulses(),
+                  [&](std::size_t k) { return solver_.earlierKeys(k); });
+  }
+  return sum;
+}
+
+template <Real Scalar, class Layout>
+template <class Pair>
+bool ContactStage<Scalar, Layout>::renumber(const Bodies& bodies, Pair& pair) {
+  const auto first = bodies.find(BodyId{pair.key1});
+  const bool second = pair.second != staticPartner;
+  const auto other = second ? bodies.find(BodyId{pair.key2}) : first;
+  if (first && other) {
+    pair.first = static_cast<std::uint32_t>(*first);
+    pair.second = second ? static_cast<std::uint32_t>(*other) : staticPartner;
+  }
+  return first && other;
+}
+
+template <Real Scalar, class Layout>
+void ContactStage<Scalar, Layout>::renumber(const Bodies& bodies) {
+  bool complete = true;
+  for (Contact<Scalar>& c : contacts_) {
+    complete = renumber(bodies, c) && complete;
+  }
+  for (Impact<Scalar>& impact : impacts()) {
+    complete = renumber(bodies, impact) && complete;
+  }
+  revision_ = complete ? bodies.revision() : revision_;
+  if (coloured_) {
+    resumed_ = solver_.solved();  // the solver counts bodies by ids: it goes on as if nothing had been
+    coloured_ = false;
+  }
+  known_ = false;  // indices are others
+  moved_ = false;
+}
+
+template <Real Scalar, class Layout>
+auto ContactStage<Scalar, Layout>::present(const Bodies& bodies) const -> const Present& {
+  if (present_.revision != bodies.revision()) {
+    Present now{{{}, contacts_.surfaces}, {}, {}, bodies.revision()};
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+      Contact<Scalar> c = contacts_[k];
+      if (renumber(bodies, c)) {
+        now.contacts.contacts.push_back(c);
+        now.places.push_back(static_cast<std::uint32_t>(k));
+      }
+    }
+    for (Impact<Scalar> impact : impacts()) {
+      if (renumber(bodies, impact)) {
+        now.impacts.push_back(impact);
+      }
+    }
+    present_ = std::move(now);
+  }
+  return present_;
+}
+
+template <Real Scalar, class Layout>
+const ContactList<Scalar>& ContactStage<Scalar, Layout>::contacts(const Bodies& bodies) const {
+  return revision_ == bodies.revision() ? contacts_ : present(bodies).contacts;
+}
+
+template <Real Scalar, class Layout>
+const std::vector<Impact<Scalar>>& ContactStage<Scalar, Layout>::impacts(const Bodies& bodies) const {
+  return revision_ == bodies.revision() ? impacts() : present(bodies).impacts;
+}
+
+template <Real Scalar, class Layout>
+std::vector<ContactImpulse<Scalar>> ContactStage<Scalar, Layout>::impulses(const Bodies& bodies) const {
+  std::vector<ContactImpulse<Scalar>> all = impulses();
+  if (revision_ != bodies.revision()) {
+    const std::vector<std::uint32_t>& places = present(bodies).places;
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      all[k] = all[places[k]];
+    }
+    all.resize(places.size());
+  }
+  return all;
+}
+
+template <Real Scalar, class Layout>
+std::size_t ContactStage<Scalar, Layout>::touches(const Bodies& bodies) const {
+  const ContactList<Scalar>& ends = contacts(bodies);
+  std::size_t count = ends.size();
+  struck_.clear();
+  for (const Impact<Scalar>& impact : impacts(bodies)) {
+    struck_.push_back({impact.key1, impact.key2});
+  }
+  std::sort(struck_.begin(), struck_.end());
+  struck_.erase(std::unique(struck_.begin(), struck_.end()), struck_.end());
+  for (const ContactKeys& keys : struck_) {
+    const auto before = [&](const Contact<Scalar>& c) { return ContactKeys{c.key1, c.key2} < keys; };
+    const auto found = std::partition_point(ends.begin(), ends.end(), before);
+    count += found == ends.end() || ContactKeys{found->key1, found->key2} != keys ? 1U : 0U;
+  }
+  return count;
+}
+
+template <Real Scalar, class Layout>
+auto ContactStage<Scalar, Layout>::allTouches(const Bodies& bodies) const -> Touches {
+  Touches all{contacts(bodies), impulses(bodies)};
+  for (const Impact<Scalar>& impact : impacts(bodies)) {
+    Contact<Scalar> c{};
+    c.first = impact.first;
+    c.second = impact.second;
+    c.key1 = impact.key1;
+    c.key2 = impact.key2;
+    c.normal = impact.normal;
+    c.arm1 = impact.distance;
+    c.gap = c.arm2 = Scalar(0);  // a user's scalar may not begin at zero
+    all.contacts.push_back(c, {});
+    all.impulses.push_back(impact.impulse);
+  }
+  return all;
+}
+
+/// Contacts of what merged are found again at the end of the next part. All others bear what they bore.
+template <Real Scalar, class Layout>
+void ContactStage<Scalar, Layout>::endMerged(const Bodies& bodies,
+                                             const std::vector<std::pair<BodyId, BodyId>>& merges) {
+  std::vector<std::uint64_t> ids;
+  for (const auto& [one, other] : merges) {
+    ids.insert(ids.end(), {toInteger(one), toInteger(other)});
+  }
+  std::sort(ids.begin(), ids.end());
+  const auto isOther = [&](std::uint64_t id) { return std::binary_search(ids.begin(), ids.end(), id); };
+  std::erase_if(contacts_.contacts, [&](Contact<Scalar>& c) {
+    return isOther(c.key1) || (c.second != staticPartner && isOther(c.key2)) || !renumber(bodies, c);
+  });
+  std::erase_if(record_.impacts(), [&](Impact<Scalar>& impact) { return !renumber(bodies, impact); });
+  contactsChanged();
+  moved_ = false;
+  revision_ = bodies.revision();
+}
+
+}  // namespace gravel
