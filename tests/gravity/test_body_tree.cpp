@@ -177,7 +177,7 @@ TEST_CASE("the first look at the field is right within a factor of three for mos
     gravel::detail::TreeMoments<double, double, gravel::detail::HarmonicTerms> moments;
     moments.compute(tree, 2);
     gravel::detail::FieldStrength<double, double> strength;
-    strength.compute(tree, 1.0, 2, gravel::detail::PeriodicImages<double, double>(),
+    strength.compute(tree, 1.0, 2, 0.0, gravel::detail::PeriodicImages<double, double>(),
                      gravel::detail::ImageField<double, double>());
     const GravityOracle oracle = bruteGravity(points.positions, points.masses, 1.0, 0.0);
     std::size_t close = 0;
@@ -202,7 +202,7 @@ TEST_CASE(
   Tree tree = treeOf(points, 24);
   gravel::detail::TreeMoments<double, double, gravel::detail::HarmonicTerms>().compute(tree, order);
   gravel::detail::RimStrength<double, double> rims;
-  rims.begin(tree, order);
+  rims.begin(tree, order, 0.0);
   std::vector<gravel::detail::ImageCell> todo;
   gravel::detail::GroupField<double> all;
   all.near = {{0, 0}};

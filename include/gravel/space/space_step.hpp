@@ -59,7 +59,7 @@ void Space<Scalar, Layout>::advanceTo(Scalar time) {
 /// step is joined to the step: it is rounding in the sum of steps.
 template <Real Scalar, class Layout>
 Scalar Space<Scalar, Layout>::stepTowards(const Scalar& rest, const Scalar& h) {
-  const Scalar rounding(1e-6);
+  const auto rounding = Scalar(1e-6);
   if (rest <= h * (Scalar(1) + rounding)) {
     return rest;
   }
