@@ -290,7 +290,7 @@ TEST_CASE("a contact apart from the rest is exact after its one blow, in the mid
 }
 
 // Seen to fail: the ball left with 9 m/s, and turned.
-TEST_CASE("what is written to a fixed body as velocity and spin counts as zero") {
+TEST_CASE("contacts take velocity and spin that are written to a fixed body as zero") {
   Bodies<double, SoA> bodies;
   Body<double> ball;
   ball.radius = 0.5;
