@@ -134,10 +134,10 @@ TEST_CASE("Steps that adapt do so in a run of a few points as one by one") {
   Space<double> run = points(5, config);
   run.advanceTo(2.0);
   Space<double> single = points(5, config);
-  for (std::size_t i = 0; i + 1 < run.steps(); ++i) {
+  for (std::size_t i = 0; i + 2 < run.steps(); ++i) {
     single.computeDynamics(i);
   }
-  single.advanceTo(2.0);
+  single.advanceTo(2.0);  // the last two, which are shortened
   CHECK(run.steps() > 128);
   CHECK(sameBits(seen(run), seen(single)));
 }
