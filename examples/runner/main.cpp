@@ -83,12 +83,9 @@ class Schedule {
     }
     // By division: a count one by one would not end where there are far more times than steps.
     const double passed = std::floor(time / interval_);
-    if (passed < static_cast<double>(count_)) {
-      next_ = std::max(next_, static_cast<std::size_t>(passed));
-      next_ += time >= at(next_) ? 1 : 0;  // what the quotient lost to rounding
-      next_ += time >= at(next_) ? 1 : 0;
-    } else {
-      next_ = count_;
+    next_ = passed < static_cast<double>(count_) ? std::max(next_, static_cast<std::size_t>(passed)) : count_;
+    while (next_ < count_ && time >= at(next_)) {  // that one itself, and what the quotient lost to rounding
+      ++next_;
     }
     return true;
   }

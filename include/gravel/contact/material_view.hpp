@@ -57,9 +57,7 @@ struct MaterialView {
     }
 
     /// Of the pair. O(log pairs). \throws std::invalid_argument as above
-    Material<Scalar> pair(std::uint32_t a, std::uint32_t b) const {
-      return a == b && pairs.empty() ? (*this)[a] : pair(a, b, (*this)[b]);
-    }
+    Material<Scalar> pair(std::uint32_t a, std::uint32_t b) const { return pair(a, b, (*this)[b]); }
     /// The same with a surface of number b, or `unlisted`, that is told what it is.
     Material<Scalar> pair(std::uint32_t a, std::uint32_t b, const Material<Scalar>& ofB) const {
       const MaterialPair<Scalar> wanted{std::min(a, b), std::max(a, b), {}};
