@@ -90,7 +90,7 @@ TEMPLATE_LIST_TEST_CASE("storage: reserve keeps the bodies and saves the move on
 // with "round up to 16" and doubling) all columns of a body fall into one set, and 31 columns do not fit
 // eight ways.
 TEMPLATE_TEST_CASE("storage: the columns of one body in SoA spread over the sets of a cache", "[storage]",
-                   float, double, long double) {
+                   GRAVEL_TEST_TYPES(double, float, long double)) {
   for (const std::size_t n : {16U, 64U, 1000U, 1024U, 4096U, 65536U}) {
     StorageOf<TestType, SoA> storage;
     for (std::size_t size = 1; size < n; size *= 2) {

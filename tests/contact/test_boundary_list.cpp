@@ -52,7 +52,8 @@ void walk(S skin, std::size_t& searches, std::size_t& contacts) {
 }  // namespace
 
 // Seen to fail: the skin of the bodies or that of the moving wall left out of the search.
-TEMPLATE_TEST_CASE("bodies near a boundary are never missed, and rarely looked for", "", float, double) {
+TEMPLATE_TEST_CASE("bodies near a boundary are never missed, and rarely looked for", "",
+                   GRAVEL_TEST_TYPES(double, float)) {
   using S = TestType;
   std::size_t searches = 0;
   std::size_t contacts = 0;

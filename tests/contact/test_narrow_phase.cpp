@@ -20,8 +20,8 @@ bool sameContacts(const ContactList<double>& one, const ContactList<double>& oth
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("contacts of a crowd are those of a brute-force loop, sorted by keys", "", float, double,
-                   long double) {
+TEMPLATE_TEST_CASE("contacts of a crowd are those of a brute-force loop, sorted by keys", "",
+                   GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
   const Bodies<S, SoA> bodies = randomCloud<S>(150, 5.0, 2);
   const auto contacts = contactsOf<S>(bodies, Material<S>{}, {{Vector3<S>(0, 0, 1), S(-2), {}}});

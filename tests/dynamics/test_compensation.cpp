@@ -188,7 +188,7 @@ TEST_CASE("What is carried is below half an ulp, and is what makes the sum whole
 // Columns are taken four bodies at a time, other layouts one by one. Seen to fail: lost parts that are kept
 // where somebody wrote; a turn that looks at the first body of four alone.
 TEMPLATE_TEST_CASE("Tiles of bodies get the bits that single bodies get, fixed and turning ones among them",
-                   "", float, double) {
+                   "", GRAVEL_TEST_TYPES(double, float)) {
   using S = TestType;
   for (const std::size_t n : {1U, 3U, 4U, 5U, 8U, 11U}) {
     const auto endOf = [n](auto layout, bool carried) {

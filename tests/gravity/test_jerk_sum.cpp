@@ -113,8 +113,8 @@ void checkAgainstPairs(const Scene<S>& scene, S G, S softening) {
 }  // namespace
 
 // Seen to fail: the 3 of the jerk as 2; the units of the jerk as those of the acceleration.
-TEMPLATE_TEST_CASE("Accelerations, jerks and rates are those of a sum pair by pair", "", float, double,
-                   long double) {
+TEMPLATE_TEST_CASE("Accelerations, jerks and rates are those of a sum pair by pair", "",
+                   GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
   for (const std::size_t n : {1U, 2U, 3U, 8U, 61U}) {
     checkAgainstPairs<S>(Scene<S>(n, n, 1.0, 1.0), S(1), S(0));

@@ -34,7 +34,7 @@ IdPairs fresh(const Cloud<S>& cloud, const S& margin, const Domain<S>& domain, c
 }  // namespace
 
 TEMPLATE_TEST_CASE("over a long random walk the list holds the pairs of a fresh search at every step", "",
-                   float, double) {
+                   GRAVEL_TEST_TYPES(double, float)) {
   using S = TestType;
   const Vector3<S> L(S(1), S(1.25), S(0.8));
   for (const Domain<S>& domain :

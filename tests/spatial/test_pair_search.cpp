@@ -30,8 +30,8 @@ IdPairs search(BroadPhaseKind kind, const Cloud<S>& cloud, double margin, const 
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("every method finds the pairs of brute force, in the promised order", "", float, double,
-                   long double) {
+TEMPLATE_TEST_CASE("every method finds the pairs of brute force, in the promised order", "",
+                   GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
   struct Scene {
     const char* name;
@@ -130,8 +130,8 @@ TEST_CASE("the order of the list depends on ids and not on indices") {
   }
 }
 
-TEMPLATE_TEST_CASE("columns of every layout and a user's vectors give one list", "", SoA, AoS, AoSoA<4>,
-                   AoSoA<8>) {
+TEMPLATE_TEST_CASE("columns of every layout and a user's vectors give one list", "",
+                   GRAVEL_TEST_TYPES(AoSoA<8>, SoA, AoS, AoSoA<4>)) {
   const auto cloud = randomCloud<double>(300, 1.0, 0.05, 3.0, 26);
   Bodies<double, TestType> bodies;
   for (std::size_t i = 0; i < cloud.size(); ++i) {
