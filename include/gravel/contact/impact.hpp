@@ -30,6 +30,9 @@ struct ImpactSettings {
   /// and is left to the solver of simultaneous contacts: a heavy one that presses a light one against a wall
   /// would else go on for as many blows as the ratio of their masses.
   std::uint32_t mostAfter = 64;
+  /// After so many blows of a body in a step those that what it falls by in the step would outrun are rest,
+  /// whatever holds it.
+  std::uint32_t mostSlow = 8;
 };
 
 /// One blow.
@@ -161,6 +164,7 @@ struct ImpactHistory {
   std::uint64_t partner = 0;                                        ///< of the last one
   S spent = S(0);
   std::uint32_t after = 0;  ///< impacts since `mostPerBody` was spent
+  bool free = false;        ///< of what held it where the step began
 };
 
 }  // namespace detail

@@ -10,7 +10,7 @@
 
 #include <gravel/contact/collision_outcome.hpp>
 #include <gravel/contact/contact_search.hpp>
-#include <gravel/contact/impact_forecast.hpp>
+#include <gravel/contact/impact_courses.hpp>
 #include <gravel/core/memory.hpp>
 
 namespace gravel {
@@ -25,16 +25,17 @@ namespace gravel {
 /// Prediction is shared between threads, O(candidates + bodies x boundaries); blows follow one another in the
 /// order of (time, keys), each O(candidates of its two bodies). The same bits for any number of threads.
 template <Real S>
-class ImpactEvents : private detail::ImpactForecast<S> {
-  using Base = detail::ImpactForecast<S>;
+class ImpactEvents : private detail::ImpactCourses<S> {
+  using Base = detail::ImpactCourses<S>;
   using Base::after;
-  using Base::earlier_;
   using Base::flightOf;
+  using Base::give;
   using Base::history_;
   using Base::impacts_;
   using Base::isDone;
   using Base::late_;
   using Base::leans_;
+  using Base::letGo;
   using Base::link;
   using Base::linked_;
   using Base::merges_;
@@ -43,10 +44,12 @@ class ImpactEvents : private detail::ImpactForecast<S> {
   using Base::queue_;
   using Base::remember;
   using Base::start_;
-  using Base::touched_;
+  using Base::struck_;
+  using Base::swept_;
   using Base::turns_;
+  using Base::twist;
   using typename Base::Event;
-  using typename Base::History;
+  using typename Base::Side;
 
  public:
   using Base::foresees;
@@ -70,29 +73,37 @@ class ImpactEvents : private detail::ImpactForecast<S> {
                           Course&& course = {}, const Decide& decide = {}, const Support& support = {}) {
     using Path = std::remove_reference_t<Course>;
     clear();
-    const detail::ImpactScene<S, B, Path, Support> scene{bodies, domain,   materials, walls,
-                                                         held,   settings, course,    support};
+    const detail::ImpactScene<S, B, Path, Support> scene{bodies,   domain, materials, walls,    held,
+                                                         settings, course, support,   &history_};
     predictAll(scene, near.pairs(), nearWalls);
     ImpactReport<S> report;
     if (!queue_.empty()) {
-      for (const std::uint32_t i : touched_) {
-        history_[i] = History{};
-      }
-      touched_.clear();
-      history_.resize(bodies.size());
-      leans_.assign(bodies.size(), 0);
-      for (const ContactName& c : held) {
-        leans_[c.first] = 1;
-        if (c.second != staticPartner) {
-          leans_[c.second] = 1;
-        }
-      }
+      Base::prepare(bodies.size(), held);
       if (linked_ != near.version() || near.version() == 0 || start_.size() != bodies.size() + 1) {
         link(bodies.size(), near.pairs());
         linked_ = near.version();
       }
     }
-    while (!queue_.empty()) {
+    S now(0);
+    const auto goOn = [&](std::initializer_list<std::uint32_t> struck) {
+      for (const std::uint32_t i : struck) {
+        near.follow(bodies, i, settings.h, late_);
+        swept_.renew(scene, i, settings.h);
+      }
+      for (const std::uint32_t i : struck) {
+        predictAgain(scene, near.pairs(), i, now);
+      }
+    };
+    while (!queue_.empty() || !struck_.empty()) {
+      if (!struck_.empty() && (queue_.empty() || queue_.front().t > now)) {
+        for (const std::uint32_t i : struck_) {
+          if (letGo(scene, near.pairs(), i, now, report)) {
+            goOn({i});
+          }
+        }
+        struck_.clear();
+        continue;
+      }
       std::pop_heap(queue_.begin(), queue_.end(), after);
       const Event event = queue_.back();
       queue_.pop_back();
@@ -101,16 +112,16 @@ class ImpactEvents : private detail::ImpactForecast<S> {
           (second && history_[event.second].impacts != event.stamp2)) {
         continue;
       }
+      now = event.t;
       if (!strike(scene, event, decide, report)) {
         continue;
       }
-      near.follow(bodies, event.first, settings.h, late_);
+      struck_.push_back(event.first);
       if (second) {
-        near.follow(bodies, event.second, settings.h, late_);
-      }
-      predictAgain(scene, near.pairs(), event.first, event.t);
-      if (second) {
-        predictAgain(scene, near.pairs(), event.second, event.t);
+        struck_.push_back(event.second);
+        goOn({event.first, event.second});
+      } else {
+        goOn({event.first});
       }
     }
     report.impacts = impacts_.size();
@@ -118,10 +129,8 @@ class ImpactEvents : private detail::ImpactForecast<S> {
   }
 
   void clear() {
-    detail::clearSpare(impacts_);
-    earlier_.clear();
+    Base::forget();
     detail::clearSpare(turns_);
-    merges_.clear();
     late_.clear();
   }
 
@@ -137,8 +146,6 @@ class ImpactEvents : private detail::ImpactForecast<S> {
 
  private:
   // Blows.
-
-  using Side = detail::ImpactSide<S>;
 
   /// Deals a blow. \return whether a course changed
   template <class Scene, class Decide>
@@ -191,7 +198,7 @@ class ImpactEvents : private detail::ImpactForecast<S> {
     // In a heap, where both already lean on others, what a step's fall brings is rest, along what holds them.
     S threshold = scene.settings.restitutionThreshold;
     if (leans_[event.first] != 0 && (boundary || leans_[event.second] != 0)) {
-      const S fall = scene.heldAlong(event.first, n) + (boundary ? S(0) : scene.heldAlong(event.second, n));
+      const S fall = this->fallOf(scene, event.first, event.second, n);
       threshold = std::max<S>(threshold, fall * h);
     }
     const bool bounces = !isDone(scene, event.first) && (boundary || !isDone(scene, event.second));
@@ -280,39 +287,6 @@ class ImpactEvents : private detail::ImpactForecast<S> {
                         rests && e < S(1) ? S(t + S(2) * e * speed / ((S(1) - e) * pull)) : t});
     remember(scene, e, report);
     return true;
-  }
-
-  /// The body leaves with this velocity and spin.
-  template <class Scene>
-  void give(const Scene& scene, std::uint32_t i, const Side& side, const Vector3<S>& v, const Vector3<S>& w,
-            const S& t, ImpactReport<S>& report) {
-    if (!side.movable) {
-      return;
-    }
-    const Vector3<S> nothing = Vector3<S>::Zero();
-    const Vector3<S> before = scene.spin(i, t);
-    const S moment = S(scene.bodies.inertiaFactors()[i]) * side.mass * side.r * side.r;
-    report.restitutionLoss -=
-        side.mass * Vector3<S>(v - side.v).dot(Vector3<S>(Vector3<S>(v + side.v) / S(2) - side.supported));
-    report.frictionLoss -= moment * Vector3<S>(w - before).dot(Vector3<S>(w + before)) / S(2);
-    scene.course.push(scene.bodies, i, S(1), {Vector3<S>(v - side.v), nothing, nothing}, t);
-    turn(scene, i, Vector3<S>(scene.course.spinAtStart(w, t)), t);
-  }
-
-  template <class Scene>
-  void twist(const Scene& scene, std::uint32_t i, const S& mobility, const Vector3<S>& stroke, const S& t) {
-    const S r = scene.bodies.radii()[i];
-    if (!(mobility == S(0)) && r > S(0) && !(stroke == Vector3<S>::Zero())) {
-      const Vector3<S> before = scene.bodies.angularVelocities()[i];
-      turn(scene, i, Vector3<S>(before - (mobility / r) * scene.course.spinAtStart(stroke, t)), t);
-    }
-  }
-
-  /// From t on the body turns as if it had begun the step with spin w.
-  template <class Scene>
-  void turn(const Scene& scene, std::uint32_t i, const Vector3<S>& w, const S& t) {
-    turns_.push_back({i, t, Vector3<S>(scene.bodies.angularVelocities()[i]), w});
-    scene.bodies.angularVelocities()[i] = w;
   }
 };
 

@@ -4,6 +4,7 @@
 /// Which pairs will touch in a step, and when, kept true while blows change the courses of bodies.
 
 #include <gravel/contact/contact.hpp>
+#include <gravel/contact/impact_past.hpp>
 #include <gravel/contact/impact_scene.hpp>
 #include <gravel/contact/swept_spheres.hpp>
 #include <gravel/core/memory.hpp>
@@ -15,9 +16,11 @@
 
 namespace gravel::detail {
 
-/// The events to come of a step in the order of (time, keys), and what each body has been through.
+/// The events to come of a step in the order of (time, keys).
 template <Real S>
-class ImpactForecast {
+class ImpactForecast : protected ImpactPast<S> {
+  using Base = ImpactPast<S>;
+
  public:
   /// Whether an impact will happen, with all bodies on these courses. The arguments are those of
   /// ImpactEvents::resolve().
@@ -32,13 +35,17 @@ class ImpactForecast {
   }
 
  protected:
+  using Base::history_;
+  using Base::isDecided;
+  using Base::isHeld;
+  using Base::isLeft;
+  using Base::isListed;
+  using Base::leans_;
   using Event = ImpactEvent<S>;
-  using History = ImpactHistory<S>;
 
   static bool after(const Event& a, const Event& b) { return comesAfter(a, b); }
 
   static constexpr std::size_t chunk = 1024;
-  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
   /// Motion of the second as seen from the first, `drift` of its image included.
   template <class Scene>
@@ -143,11 +150,6 @@ class ImpactForecast {
     }
   }
 
-  static bool isListed(std::span<const ContactName> names, const ContactKeys& keys) {
-    const auto found = placeOf(names, keys);
-    return found != names.end() && found->keys == keys;
-  }
-
   /// Pairs of each body, as places in the list.
   void link(std::size_t n, std::span<const Pair> pairs) {
     if (pairs.size() > std::numeric_limits<std::uint32_t>::max() / 2) {
@@ -167,7 +169,8 @@ class ImpactForecast {
   }
 
   template <class Scene>
-  void predictAgain(const Scene& scene, std::span<const Pair> pairs, std::uint32_t body, const S& from) {
+  [[gnu::flatten]] void predictAgain(const Scene& scene, std::span<const Pair> pairs, std::uint32_t body,
+                                     const S& from) {
     if (isLeft(scene, body)) {
       return;
     }
@@ -183,13 +186,16 @@ class ImpactForecast {
     const bool meets = radius > S(0) && detail::isMovable(scene.bodies, body);
     for (std::uint32_t w = 0; meets && w < scene.walls.size(); ++w) {
       const HalfSpace<S>& wall = scene.walls[w];
+      if (!swept_.mayMeet(body, wall, w)) {
+        continue;
+      }
       const RelativeFlight<S> flight = flightOf(scene, body, wall);
       const std::uint64_t key1 = scene.bodies.ids()[body];
       const std::uint64_t key2 = boundaryKey(scene.walls[w].number);
-      if (isHeld(scene, body, key1, key2)) {
+      if (isHeld(scene, body, staticPartner, {key1, key2})) {
         const S gap = wall.normal.dot(flight.place(from)) - radius;
-        if (isDriven(scene, gap, radius, S(-wall.normal.dot(flight.velocity(from))),
-                     scene.heldAlong(body, wall.normal))) {
+        if (isDriven(scene, body, staticPartner, gap, radius, S(-wall.normal.dot(flight.velocity(from))),
+                     wall.normal)) {
           schedule({from, body, staticPartner, key1, key2, 0, 0, w});
         }
       } else if (const auto t = timeOfImpact<S>(flight, wall.normal, radius, from)) {
@@ -201,10 +207,11 @@ class ImpactForecast {
   template <class Scene>
   void predict(const Scene& scene, const Pair& pair, const S& from) {
     const auto& [i, j] = pair;
-    if (isLeft(scene, i) || isLeft(scene, j) || !detail::canTouch(scene.bodies, i, j)) {
+    Vector3<S> drift;
+    if (!swept_.mayMeet(i, j, scene.domain, scene.settings.time, scene.settings.h, drift) ||
+        isLeft(scene, i) || isLeft(scene, j) || !detail::canTouch(scene.bodies, i, j)) {
       return;
     }
-    Vector3<S> drift;
     const RelativeFlight<S> flight = flightOf(scene, i, j, drift);
     const S reach = S(scene.bodies.radii()[i]) + S(scene.bodies.radii()[j]);
     const std::uint64_t key1 = scene.bodies.ids()[i];
@@ -212,12 +219,11 @@ class ImpactForecast {
     if (isDecided(i, key2)) {
       return;
     }
-    if (isHeld(scene, i, key1, key2)) {
+    if (isHeld(scene, i, j, {key1, key2})) {
       const Vector3<S> r = flight.place(from);
       const S distance = detail::safeNorm(r);
       const Vector3<S> n = detail::safeUnit(r);
-      const S fall = scene.heldAlong(i, n) + scene.heldAlong(j, n);
-      if (isDriven(scene, S(distance - reach), reach, S(-n.dot(flight.velocity(from))), fall)) {
+      if (isDriven(scene, i, j, S(distance - reach), reach, S(-n.dot(flight.velocity(from))), n)) {
         schedule({from, i, j, key1, key2});
       }
     } else if (const auto t = timeOfImpact<S>(flight, reach, from)) {
@@ -232,86 +238,49 @@ class ImpactForecast {
     std::push_heap(queue_.begin(), queue_.end(), after);
   }
 
-  /// Whether somebody else has decided about the pair in this step.
-  bool isDecided(std::uint32_t first, std::uint64_t key2) const {
-    for (std::uint32_t k = history_[first].rests; k != none; k = earlier_[k]) {
-      if (impacts_[k].decided && impacts_[k].key2 == key2) {
-        return true;
+  /// Whether a blow has set a body free that leans on others: all that hold it open at `from`, so fast that
+  /// it does not fall back in this step.
+  template <class Scene>
+  bool isSetFree(const Scene& scene, std::span<const Pair> pairs, std::uint32_t body, const S& from) const {
+    const Vector3<S> support = scene.supportOf(body);
+    if (leans_[body] == 0 || support == Vector3<S>::Zero()) {
+      return false;
+    }
+    const S least = detail::safeNorm(support) * scene.settings.h;
+    for (std::uint32_t k = start_[body]; k < start_[body + 1]; ++k) {
+      const auto& [i, j] = pairs[ofBody_[k]];
+      if (isListed(scene.held, {scene.bodies.ids()[i], scene.bodies.ids()[j]})) {
+        Vector3<S> drift;
+        const RelativeFlight<S> flight = flightOf(scene, i, j, drift);
+        if (!(detail::safeUnit(flight.place(from)).dot(flight.velocity(from)) > least)) {
+          return false;
+        }
       }
     }
-    return false;
-  }
-
-  /// Solved together with others; or brought to rest in this step.
-  template <class Scene>
-  bool isHeld(const Scene& scene, std::uint32_t first, std::uint64_t key1, std::uint64_t key2) const {
-    for (std::uint32_t k = history_[first].rests; k != none; k = earlier_[k]) {
-      if (impacts_[k].key2 == key2) {
-        return true;
+    for (const HalfSpace<S>& wall : scene.walls) {
+      if (isListed(scene.held, {scene.bodies.ids()[body], boundaryKey(wall.number)}) &&
+          !(wall.normal.dot(flightOf(scene, body, wall).velocity(from)) > least)) {
+        return false;
       }
     }
-    return isListed(scene.held, {key1, key2});
-  }
-
-  /// It does not bounce any more.
-  template <class Scene>
-  bool isDone(const Scene& scene, std::uint32_t body) const {
-    return history_[body].spent >= scene.settings.mostPerBody;
-  }
-  /// It is left to the solver of simultaneous contacts.
-  template <class Scene>
-  bool isLeft(const Scene& scene, std::uint32_t body) const {
-    return history_[body].after >= scene.settings.mostAfter;
-  }
-
-  /// Enters the last impact.
-  template <class Scene>
-  void remember(const Scene& scene, const S& e, ImpactReport<S>& report) {
-    const Impact<S>& impact = impacts_.back();
-    const auto enter = [&](std::uint32_t body, std::uint64_t partner) {
-      History& past = history_[body];
-      const bool before = isDone(scene, body);
-      const S least = S(1) / S(512);
-      past.after += before ? 1 : 0;
-      past.spent += past.impacts > 0 && past.partner == partner ? least : S(S(1) - e + least);
-      past.partner = partner;
-      if (past.impacts++ == 0) {
-        touched_.push_back(body);
-      }
-      report.postponed += isDone(scene, body) && !before ? 1U : 0U;
-    };
-    enter(impact.first, impact.key2);
-    if (impact.second != staticPartner) {
-      enter(impact.second, impact.key1);
-    }
-    earlier_.push_back(none);
-    if (impact.rests || impact.decided) {
-      earlier_.back() = history_[impact.first].rests;
-      history_[impact.first].rests = static_cast<std::uint32_t>(impacts_.size() - 1);
-    }
+    return true;
   }
 
   /// A blow drives a held pair together, faster than what rests picks up in a step.
-  /// \param fall [m s^-2] of both, as they are held
   template <class Scene>
-  static bool isDriven(const Scene& scene, const S& gap, const S& reach, const S& u, const S& fall) {
-    return gap <= reach / S(1000) && u > fall * scene.settings.h + scene.settings.restitutionThreshold;
+  bool isDriven(const Scene& scene, std::uint32_t i, std::uint32_t j, const S& gap, const S& reach,
+                const S& u, const Vector3<S>& n) const {
+    return gap <= reach / S(1000) &&
+           u > this->fallOf(scene, i, j, n) * scene.settings.h + scene.settings.restitutionThreshold;
   }
 
   std::vector<Event> queue_;
   SweptSpheres<S> swept_;
   std::vector<std::vector<Event>> parts_;
-  std::vector<History> history_;
-  std::vector<unsigned char> leans_;    ///< bodies with a contact that is held
-  std::vector<std::uint32_t> touched_;  ///< bodies with a history
   std::uint64_t linked_ = 0;
   std::vector<std::uint32_t> start_;
   std::vector<std::uint32_t> ofBody_;
   std::vector<Pair> late_;
-  std::vector<Impact<S>> impacts_;
-  std::vector<std::uint32_t> earlier_;  ///< of an impact that rests: the one before of the same first body
-  std::vector<TurnChange<S>> turns_;
-  std::vector<std::pair<std::uint64_t, std::uint64_t>> merges_;
 };
 
 }  // namespace gravel::detail

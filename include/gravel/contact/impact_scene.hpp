@@ -30,17 +30,24 @@ struct ImpactScene {
   const ImpactSettings<S>& settings;
   Course& course;
   const Support& support;
+  const std::vector<ImpactHistory<S>>* history = nullptr;
 
   /// Mean velocity of the drift, and accelerations; none of what nothing moves.
   Vector3<S> velocity(std::uint32_t i) const {
     return isMovable(bodies, i) ? Vector3<S>(course.velocity(bodies, i)) : Vector3<S>(Vector3<S>::Zero());
   }
-  Vector3<S> acceleration(std::uint32_t i) const {
-    Vector3<S> a = freeAcceleration(i);
+  Vector3<S> acceleration(std::uint32_t i) const { return freeAcceleration(i) + supportOf(i); }
+  /// Nothing holds what a blow has lifted off.
+  Vector3<S> supportOf(std::uint32_t i) const {
     if constexpr (!std::is_same_v<Support, NoSupport>) {
-      a += isMovable(bodies, i) ? Vector3<S>(support(i)) : Vector3<S>(Vector3<S>::Zero());
+      if (isMovable(bodies, i) && !isFree(i)) {
+        return support(i);
+      }
     }
-    return a;
+    return Vector3<S>::Zero();
+  }
+  bool isFree(std::uint32_t i) const {
+    return history != nullptr && i < history->size() && (*history)[i].free;
   }
   /// By which a body falls that nothing holds.
   Vector3<S> freeAcceleration(std::uint32_t i) const {
@@ -51,7 +58,9 @@ struct ImpactScene {
   S heldAlong(std::uint32_t i, const Vector3<S>& n) const {
     const S fall = safeNorm(freeAcceleration(i));
     if constexpr (!std::is_same_v<Support, NoSupport>) {
-      return isMovable(bodies, i) ? std::min<S>(fall, sizeOf<S>(n.dot(Vector3<S>(support.any(i))))) : fall;
+      return isFree(i)              ? S(0)
+             : isMovable(bodies, i) ? std::min<S>(fall, sizeOf<S>(n.dot(Vector3<S>(support.any(i)))))
+                                    : fall;
     } else {
       return fall;
     }
@@ -63,11 +72,7 @@ struct ImpactScene {
   }
   /// What support makes of the velocity of a movable body at t [s] since the start of the step.
   Vector3<S> velocityBySupport(std::uint32_t i, const S& t) const {
-    if constexpr (!std::is_same_v<Support, NoSupport>) {
-      return Vector3<S>(support(i)) * (t - settings.h / S(2));
-    } else {
-      return Vector3<S>::Zero();
-    }
+    return supportOf(i) * (t - settings.h / S(2));
   }
 };
 

@@ -25,21 +25,25 @@ class SweptSpheres {
   template <class Scene>
   void gather(const Scene& scene, const S& h) {
     spheres_.resize(scene.bodies.size());
-    parallelFor(spheres_.size(), chunk, [&](std::size_t k) {
-      const auto i = static_cast<std::uint32_t>(k);
-      S way(0);
-      if (isMovable(scene.bodies, k)) {
-        way = h * safeNorm(Vector3<S>(scene.course.velocity(scene.bodies, i))) +
-              h * h / S(2) *
-                  (sumAbs(Vector3<S>(scene.course.acceleration(scene.bodies, i))) +
-                   sumAbs(Vector3<S>(scene.bodies.accelerations()[i])));
-      }
-      spheres_[k] = {scene.bodies.positions()[i], S(scene.bodies.radii()[i]) + way};
-    });
+    parallelFor(spheres_.size(), chunk,
+                [&](std::size_t k) { renew(scene, static_cast<std::uint32_t>(k), h); });
     wallWays_.clear();
     for (const HalfSpace<S>& wall : scene.walls) {
       wallWays_.push_back(h * sumAbs(wall.velocity));
     }
+  }
+
+  /// The course of body i is another one now.
+  template <class Scene>
+  void renew(const Scene& scene, std::uint32_t i, const S& h) {
+    S way(0);
+    if (isMovable(scene.bodies, i)) {
+      way = h * safeNorm(Vector3<S>(scene.course.velocity(scene.bodies, i))) +
+            h * h / S(2) *
+                (sumAbs(Vector3<S>(scene.course.acceleration(scene.bodies, i))) +
+                 sumAbs(Vector3<S>(scene.bodies.accelerations()[i])));
+    }
+    spheres_[i] = {scene.bodies.positions()[i], S(scene.bodies.radii()[i]) + way};
   }
 
   /// \param drift out: [m s^-1] of the image of the second  \param time [s]  \param h [s]

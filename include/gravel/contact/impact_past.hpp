@@ -1,0 +1,143 @@
+#pragma once
+
+/// \file
+/// What each body has been through in a step, by the impacts that were dealt in it.
+
+#include <gravel/contact/impact.hpp>
+#include <gravel/core/memory.hpp>
+
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace gravel::detail {
+
+template <Real S>
+class ImpactPast {
+ protected:
+  using History = ImpactHistory<S>;
+
+  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+
+  /// A new step: nothing has happened.
+  void forget() {
+    for (const std::uint32_t i : touched_) {
+      history_[i] = History{};
+    }
+    touched_.clear();
+    clearSpare(impacts_);
+    earlier_.clear();
+    merges_.clear();
+  }
+
+  /// For the impacts of so many bodies.
+  void prepare(std::size_t count, std::span<const ContactName> held) {
+    history_.resize(count);
+    leans_.assign(count, 0);
+    for (const ContactName& c : held) {
+      leans_[c.first] = 1;
+      if (c.second != staticPartner) {
+        leans_[c.second] = 1;
+      }
+    }
+  }
+
+  static bool isListed(std::span<const ContactName> names, const ContactKeys& keys) {
+    const auto found = placeOf(names, keys);
+    return found != names.end() && found->keys == keys;
+  }
+
+  /// Whether somebody else has decided about the pair in this step.
+  bool isDecided(std::uint32_t first, std::uint64_t key2) const {
+    for (std::uint32_t k = history_[first].rests; k != none; k = earlier_[k]) {
+      if (impacts_[k].decided && impacts_[k].key2 == key2) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  /// Brought to rest in this step, or decided about.
+  bool isAtRest(std::uint32_t first, std::uint64_t key2) const {
+    for (std::uint32_t k = history_[first].rests; k != none; k = earlier_[k]) {
+      if (impacts_[k].key2 == key2) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  /// Solved together with others, and both lean on each other still; or brought to rest in this step.
+  template <class Scene>
+  bool isHeld(const Scene& scene, std::uint32_t first, std::uint32_t second, const ContactKeys& keys) const {
+    if (isAtRest(first, keys.second)) {
+      return true;
+    }
+    return !scene.isFree(first) && !(second != staticPartner && scene.isFree(second)) &&
+           isListed(scene.held, keys);
+  }
+
+  /// [m s^-2] of both along n: what is not faster than this brings in a step is rest. As they are held, so
+  /// that what nothing holds along n passes on the slowest blow; or as they fall freely, once a body has had
+  /// so many blows in the step that it is one of a heap. (Without that a heap of 10 000 that falls deals 47
+  /// 000 blows a step, most of them between the same pairs, in place of 10 000, and comes to rest neither
+  /// sooner nor better.)
+  template <class Scene>
+  S fallOf(const Scene& scene, std::uint32_t i, std::uint32_t j, const Vector3<S>& n) const {
+    const auto one = [&](std::uint32_t k) {
+      return history_[k].impacts > scene.settings.mostSlow ? S(safeNorm(scene.freeAcceleration(k)))
+                                                           : scene.heldAlong(k, n);
+    };
+    return one(i) + (j == staticPartner ? S(0) : one(j));
+  }
+
+  /// It does not bounce any more.
+  template <class Scene>
+  bool isDone(const Scene& scene, std::uint32_t body) const {
+    return history_[body].spent >= scene.settings.mostPerBody;
+  }
+  /// It is left to the solver of simultaneous contacts.
+  template <class Scene>
+  bool isLeft(const Scene& scene, std::uint32_t body) const {
+    return history_[body].after >= scene.settings.mostAfter;
+  }
+
+  /// Enters the last impact.
+  template <class Scene>
+  void remember(const Scene& scene, const S& e, ImpactReport<S>& report) {
+    const Impact<S>& impact = impacts_.back();
+    const auto enter = [&](std::uint32_t body, std::uint64_t partner) {
+      History& past = history_[body];
+      const bool before = isDone(scene, body);
+      const S least = S(1) / S(512);
+      past.after += before ? 1 : 0;
+      past.spent += past.impacts > 0 && past.partner == partner ? least : S(S(1) - e + least);
+      past.partner = partner;
+      if (past.impacts++ == 0) {
+        touched_.push_back(body);
+      }
+      report.postponed += isDone(scene, body) && !before ? 1U : 0U;
+    };
+    enter(impact.first, impact.key2);
+    if (impact.second != staticPartner) {
+      enter(impact.second, impact.key1);
+    }
+    earlier_.push_back(none);
+    // Once a pair: balls without restitution may press on each other a hundred times in a step.
+    if (impact.decided || (impact.rests && !isAtRest(impact.first, impact.key2))) {
+      earlier_.back() = history_[impact.first].rests;
+      history_[impact.first].rests = static_cast<std::uint32_t>(impacts_.size() - 1);
+    }
+  }
+
+  std::vector<History> history_;
+  std::vector<unsigned char> leans_;    ///< bodies with a contact that is held
+  std::vector<std::uint32_t> touched_;  ///< bodies with a history
+  std::vector<std::uint32_t> struck_;   ///< by the blows of this moment
+  std::vector<Impact<S>> impacts_;
+  std::vector<std::uint32_t> earlier_;  ///< of an impact that rests: the one before of the same first body
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> merges_;
+};
+
+}  // namespace gravel::detail
