@@ -351,12 +351,15 @@ TEST_CASE("What a blow lifts off its floor leaves as a free body, whatever the s
   }
 }
 
-// Along a smooth table, under the middle of a large ball. Seen to fail as above: 0.4 m/s of 0.28.
+// Along a smooth table, under the middle of a large ball. Seen to fail as above (0.229 and 0.182 m/s up with
+// 16 and 20 steps). With another ball at its side, which it leaves along the touch, to the second order:
+// normals are those of the straight way of the drift. Seen to fail where what stands at the side held it,
+// too.
 TEST_CASE("A small ball lifts a large one off the table by the same blow, whatever the step") {
-  for (const double e : {1.0, 0.7}) {
+  for (const auto& [e, side] : {std::pair{1.0, false}, {0.7, false}, {1.0, true}, {0.7, true}}) {
     std::vector<Vec> first;
-    for (const double steps : {16.0, 20.0, 50.0, 512.0}) {
-      CAPTURE(e, steps);
+    for (const double steps : {512.0, 16.0, 20.0, 50.0}) {
+      CAPTURE(e, side, steps);
       SimulationConfig<double> config = plain(0.25 / steps);
       config.coeffRestitution = e;
       Space<double> space(config);
@@ -364,6 +367,9 @@ TEST_CASE("A small ball lifts a large one off the table by the same blow, whatev
       space.addPlane({0, 0, 1}, 0.0);
       space.addBody(ball({0, 0, 0.1}, {0, 0, 0}, 0.1));
       space.addBody(ball({-0.2717, 0, 0.05}, {2, 0, 0}, 0.05));
+      if (side) {
+        space.addBody(ball({0, 0.2, 0.1}, {0, 0, 0}, 0.1));
+      }
       const double energy = space.energyLedger().total();
       for (int k = 0; k < steps; ++k) {
         space.computeDynamics(space.steps());
@@ -374,7 +380,7 @@ TEST_CASE("A small ball lifts a large one off the table by the same blow, whatev
       CHECK(all[1][2] > 0.1);
       for (std::size_t k = 0; k < all.size(); ++k) {
         CAPTURE(k, all[k].transpose(), first[k].transpose());
-        CHECK((all[k] - first[k]).norm() < 1e-11);
+        CHECK((all[k] - first[k]).norm() < (side ? 9.81 * config.timeStep * config.timeStep : 1e-11));
       }
       CHECK_THAT(space.energyLedger().total(), WithinAbs(energy, 1e-12));
     }
@@ -396,4 +402,25 @@ TEST_CASE("What the blows of one moment bring back to rest on its floor stays th
     CHECK_THAT(space.body(0).position()[2], WithinAbs(0.1, 1e-14));
   }
   CHECK(space.body(1).velocity()[2] > 0);
+}
+
+// Two balls rest on each other by their own gravity; a third strikes one off. Seen to fail: let go without a
+// push back on the other one, the sum of momenta changed by m a (t - h/2), 1.2e-3 here.
+TEST_CASE("A blow that parts a pile in space keeps momentum and the centre of mass") {
+  SimulationConfig<double> config = plain(1e-2);
+  config.G = 1;
+  config.coeffRestitution = 0.5;
+  Space<double> space(config);
+  space.addBody(ball({-1, 0, 0}, {0, 0, 0}, 1));
+  space.addBody(ball({1, 0, 0}, {0, 0, 0}, 1));
+  space.addBody(ball({0.4, -4, 0}, {0, 10, 0}, 1));
+  for (int k = 0; k < 60; ++k) {
+    space.computeDynamics(space.steps());
+  }
+  CHECK(space.body(1).velocity().norm() > 1);
+  Vec momentum = Vec::Zero();
+  for (std::size_t i = 0; i < 3; ++i) {
+    momentum += space.body(i).mass() * space.body(i).velocity();
+  }
+  CHECK((momentum - space.body(2).mass() * Vec(0, 10, 0)).norm() < 1e-11 * space.body(2).mass());
 }

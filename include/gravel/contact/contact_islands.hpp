@@ -17,11 +17,12 @@ namespace gravel {
 class ContactIslands {
  public:
   /// O(bodies + contacts), but for a factor that grows slower than any logarithm.
-  template <Real S, ContactBodies B>
-  void find(std::span<const Contact<S>> contacts, const B& bodies) {
+  /// \param contacts `first` and `second` of each: contacts, or their names
+  template <class C, ContactBodies B>
+  void find(std::span<const C> contacts, const B& bodies) {
     parent_.resize(bodies.size());
     std::iota(parent_.begin(), parent_.end(), std::uint32_t{0});
-    for (const Contact<S>& c : contacts) {
+    for (const C& c : contacts) {
       if (c.second != staticPartner && detail::isMovable(bodies, c.first) &&
           detail::isMovable(bodies, c.second)) {
         const std::uint32_t a = rootOf(c.first);

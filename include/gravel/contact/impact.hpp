@@ -121,6 +121,11 @@ struct StraightCourse {
   static const Vector3<S>& spinAtStart(const Vector3<S>& w, const S&) { return w; }
   /// What is added to spins for those by which orientations turn over a step, but for a turn of the frame.
   static Vector3<S> frameSpin() { return Vector3<S>::Zero(); }
+  /// [J kg^-1] that forces do to a body that is put elsewhere by `shift`.
+  template <class B>
+  S workOf(const B& bodies, std::size_t i, const Vector3<S>& shift) const {
+    return acceleration(bodies, i).dot(shift);
+  }
   /// \param strokes changes of velocity [m s^-1] one after another, each to be multiplied by `share`
   /// \param t [s] since the start of the step
   template <class B>
@@ -158,13 +163,13 @@ bool comesAfter(const ImpactEvent<S>& a, const ImpactEvent<S>& b) {
 
 template <Real S>
 struct ImpactHistory {
-  std::uint32_t impacts = 0;
+  std::uint32_t impacts = 0;                                        ///< and other changes of its course
   std::uint32_t rests = std::numeric_limits<std::uint32_t>::max();  ///< the last one that rests, of which
                                                                     ///< this is the first body
   std::uint64_t partner = 0;                                        ///< of the last one
   S spent = S(0);
   std::uint32_t after = 0;  ///< impacts since `mostPerBody` was spent
-  bool free = false;        ///< of what held it where the step began
+  bool free = false;        ///< let go: nothing holds it any more
 };
 
 }  // namespace detail

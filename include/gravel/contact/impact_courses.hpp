@@ -16,16 +16,23 @@ class ImpactCourses : protected ImpactForecast<S> {
 
  protected:
   using Base::history_;
+  using Base::isAnchored;
   using Base::isSetFree;
   using Side = ImpactSide<S>;
 
-  /// A body that the blows of a moment have lifted off what holds it falls freely from t on, from the same
-  /// place x + v t - a t (h - t)/2 at the same velocity v + a (t - h/2), by the other a. Solves counted on
-  /// the support for the whole step: what that takes of the energy is given back.
+  /// A body that the blows of a moment t have lifted off what held it, with an acceleration s, falls freely
+  /// from then on. The course x + u t - (a + s) t (h - t)/2, at u + (a + s)(t - h/2), goes on from the same
+  /// place at the same velocity by a alone:
+  ///     u' = u + s (t - h/2),   x' = x - t (u' - u) - s t (h - t)/2.
+  /// Of its energy solves and blows have booked what would be so with the support to the end of the step.
+  /// What the change of the course does to it is missing, m (u' - u).(u + a (t - h/2) + (u' - u)/2) for the
+  /// velocity and, for the shift of x, the work of a. What held it must lean on something that does not move:
+  /// of a pile in space the others would have to be pushed back for momentum's sake, and by which of its
+  /// contacts is not known before the next solve.
   template <class Scene>
   bool letGo(const Scene& scene, std::span<const Pair> pairs, std::uint32_t i, const S& t,
              ImpactReport<S>& report) {
-    if (!isSetFree(scene, pairs, i, t)) {
+    if (!isSetFree(scene, pairs, i, t) || !isAnchored(scene, i)) {
       return false;
     }
     const Vector3<S> nothing = Vector3<S>::Zero();
@@ -33,8 +40,8 @@ class ImpactCourses : protected ImpactForecast<S> {
     const Vector3<S> dv = scene.velocityBySupport(i, t);
     const Vector3<S> v = scene.course.velocityAt(scene.bodies, i, t, h);
     const Vector3<S> shift = scene.supportOf(i) * (t * (t - h) / S(2));
-    report.restitutionLoss -= S(scene.bodies.masses()[i]) *
-                              (dv.dot(Vector3<S>(v + dv / S(2))) - scene.freeAcceleration(i).dot(shift));
+    report.restitutionLoss -= S(scene.bodies.masses()[i]) * (dv.dot(Vector3<S>(v + dv / S(2))) -
+                                                             scene.course.workOf(scene.bodies, i, shift));
     scene.bodies.positions()[i] += shift;
     scene.course.push(scene.bodies, i, S(1), {dv, nothing, nothing}, t);
     history_[i].free = true;

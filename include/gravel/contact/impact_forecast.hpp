@@ -238,32 +238,40 @@ class ImpactForecast : protected ImpactPast<S> {
     std::push_heap(queue_.begin(), queue_.end(), after);
   }
 
-  /// Whether a blow has set a body free that leans on others: all that hold it open at `from`, so fast that
-  /// it does not fall back in this step.
+  /// Whether blows have set a body free that leans on others: what bears it and what lies on it opens at
+  /// `from`, faster than it falls by in a step; what touches its sides does not count.
   template <class Scene>
   bool isSetFree(const Scene& scene, std::span<const Pair> pairs, std::uint32_t body, const S& from) const {
     const Vector3<S> support = scene.supportOf(body);
     if (leans_[body] == 0 || support == Vector3<S>::Zero()) {
       return false;
     }
-    const S least = detail::safeNorm(support) * scene.settings.h;
+    const S size = detail::safeNorm(support);
+    bool borne = false;
+    // A contact that pushes the body along n, and opens at speed u.
+    const auto holds = [&](const Vector3<S>& n, const S& u) {
+      const S share = n.dot(support);
+      borne = borne || share > size / S(1000);
+      return (share > size / S(1000) || -share > size / S(1000)) && !(u > size * scene.settings.h);
+    };
     for (std::uint32_t k = start_[body]; k < start_[body + 1]; ++k) {
       const auto& [i, j] = pairs[ofBody_[k]];
       if (isListed(scene.held, {scene.bodies.ids()[i], scene.bodies.ids()[j]})) {
         Vector3<S> drift;
         const RelativeFlight<S> flight = flightOf(scene, i, j, drift);
-        if (!(detail::safeUnit(flight.place(from)).dot(flight.velocity(from)) > least)) {
+        const Vector3<S> n = detail::safeUnit(flight.place(from));
+        if (holds(body == i ? Vector3<S>(-n) : n, n.dot(flight.velocity(from)))) {
           return false;
         }
       }
     }
     for (const HalfSpace<S>& wall : scene.walls) {
       if (isListed(scene.held, {scene.bodies.ids()[body], boundaryKey(wall.number)}) &&
-          !(wall.normal.dot(flightOf(scene, body, wall).velocity(from)) > least)) {
+          holds(wall.normal, wall.normal.dot(flightOf(scene, body, wall).velocity(from)))) {
         return false;
       }
     }
-    return true;
+    return borne;
   }
 
   /// A blow drives a held pair together, faster than what rests picks up in a step.

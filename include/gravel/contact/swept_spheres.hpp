@@ -19,7 +19,7 @@ template <Real S>
 class SweptSpheres {
  public:
   /// No body gets further from where it starts than |v| h + |a| h^2/8, with the acceleration a of its course
-  /// and at most twice that of forces more, by what holds it. O(N).
+  /// and at most twice that of forces more, by what holds it; h^2/2 leaves room. O(N).
   /// \param scene `bodies`, their `course` with its mean velocity and acceleration, and `walls`
   /// \param h [s]
   template <class Scene>

@@ -58,6 +58,13 @@ class EpicycleCourse {
   Vector3<Scalar> frameSpin() const { return {Scalar(0), Scalar(0), frame_.omega}; }
 
   template <class B>
+  Scalar workOf(const B& bodies, std::size_t i, const Vector3<Scalar>& shift) const {
+    const Vector3<Scalar> x = bodies.positions()[i];
+    return Vector3<Scalar>(bodies.accelerations()[i]).dot(shift) -
+           (frame_.potential(Vector3<Scalar>(x + shift)) - frame_.potential(x));
+  }
+
+  template <class B>
   void push(B& bodies, std::size_t i, const Scalar& share, const std::array<Vector3<Scalar>, 3>& strokes,
             const Scalar& t) {
     const Vector3<Scalar> blow = share * Vector3<Scalar>(strokes[0] + strokes[1] + strokes[2]);
