@@ -169,8 +169,7 @@ class ImpactForecast : protected ImpactPast<S> {
   }
 
   template <class Scene>
-  [[gnu::flatten]] void predictAgain(const Scene& scene, std::span<const Pair> pairs, std::uint32_t body,
-                                     const S& from) {
+  void predictAgain(const Scene& scene, std::span<const Pair> pairs, std::uint32_t body, const S& from) {
     if (isLeft(scene, body)) {
       return;
     }
