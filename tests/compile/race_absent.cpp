@@ -14,7 +14,7 @@ int main() {
   std::vector<int> writer(count), reader(count);
   // Elements cross from thread to thread only if two threads took part: repeat until some did, often.
   std::size_t crossed = 0;
-  for (int round = 0; round < 10000 && crossed < 100 * count; ++round) {
+  for (int round = 0; round < 50000 && crossed < 100 * count; ++round) {
     gravel::parallelFor(count, 64, [&](std::size_t i) {
       first[i] = i;
       writer[i] = omp_get_thread_num();
