@@ -24,7 +24,8 @@ if(GRAVEL_SANITIZE)
   set(gravel_sanitizer_flags "-fsanitize=${gravel_sanitizers}" -fno-omit-frame-pointer)
   if("undefined" IN_LIST GRAVEL_SANITIZE)
     list(APPEND gravel_sanitizer_flags -fno-sanitize-recover=all)
-    if("address" IN_LIST GRAVEL_SANITIZE)  # sees what is read there; the sum alone takes 15 % of the compile time
+    # Sums of pointers alone take 15 % of the compile time, and the address sanitizer sees what is read there.
+    if("address" IN_LIST GRAVEL_SANITIZE)
       list(APPEND gravel_sanitizer_flags -fno-sanitize=pointer-overflow)
     endif()
   endif()

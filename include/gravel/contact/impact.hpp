@@ -30,8 +30,8 @@ struct ImpactSettings {
   /// and is left to the solver of simultaneous contacts: a heavy one that presses a light one against a wall
   /// would else go on for as many blows as the ratio of their masses.
   std::uint32_t mostAfter = 64;
-  /// After so many blows of a body in a step those that what it falls by in the step would outrun are rest,
-  /// whatever holds it.
+  /// After so many blows of both in a step two bodies that lean on each other are no longer driven together
+  /// by others, unless faster than what they fall by in the step.
   std::uint32_t mostSlow = 8;
 };
 

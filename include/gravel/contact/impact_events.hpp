@@ -198,7 +198,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     // In a heap, where both already lean on others, what a step's fall brings is rest, along what holds them.
     S threshold = scene.settings.restitutionThreshold;
     if (leans_[event.first] != 0 && (boundary || leans_[event.second] != 0)) {
-      const S fall = this->fallOf(scene, event.first, event.second, n);
+      const S fall = scene.heldAlong(event.first, event.second, n);
       threshold = std::max<S>(threshold, fall * h);
     }
     const bool bounces = !isDone(scene, event.first) && (boundary || !isDone(scene, event.second));

@@ -251,7 +251,7 @@ class ImpactForecast : protected ImpactPast<S> {
     const auto holds = [&](const Vector3<S>& n, const S& u) {
       const S share = n.dot(support);
       borne = borne || share > size / S(1000);
-      return (share > size / S(1000) || -share > size / S(1000)) && !(u > size * scene.settings.h);
+      return sizeOf<S>(share) > size / S(1000) && !(u > size * scene.settings.h);
     };
     for (std::uint32_t k = start_[body]; k < start_[body + 1]; ++k) {
       const auto& [i, j] = pairs[ofBody_[k]];
@@ -273,12 +273,21 @@ class ImpactForecast : protected ImpactPast<S> {
     return borne;
   }
 
-  /// A blow drives a held pair together, faster than what rests picks up in a step.
+  /// A blow drives a held pair together, faster than what rests picks up in a step: as it is held, so that
+  /// what nothing holds along n passes on the slowest blow. Or as it falls freely, once both bodies have had
+  /// so many blows in the step that they are in a heap. (Without that a heap of 10 000 that falls deals 47
+  /// 000 blows a step, most of them between the same pairs, and comes to rest neither sooner nor better.)
   template <class Scene>
   bool isDriven(const Scene& scene, std::uint32_t i, std::uint32_t j, const S& gap, const S& reach,
                 const S& u, const Vector3<S>& n) const {
-    return gap <= reach / S(1000) &&
-           u > this->fallOf(scene, i, j, n) * scene.settings.h + scene.settings.restitutionThreshold;
+    const auto isOften = [&](std::uint32_t k) {
+      return k != staticPartner && isMovable(scene.bodies, k) &&
+             history_[k].impacts >= scene.settings.mostSlow;
+    };
+    const S fall = isOften(i) && isOften(j)
+                       ? S(safeNorm(scene.freeAcceleration(i)) + safeNorm(scene.freeAcceleration(j)))
+                       : scene.heldAlong(i, j, n);
+    return gap <= reach / S(1000) && u > fall * scene.settings.h + scene.settings.restitutionThreshold;
   }
 
   std::vector<Event> queue_;

@@ -100,20 +100,6 @@ class ImpactPast {
            isListed(scene.held, keys);
   }
 
-  /// [m s^-2] of both along n: an approach slower than this times h is rest. As they are held, so that what
-  /// nothing holds along n passes on the slowest blow. Or as they fall freely, once a body has had so many
-  /// blows in the step that it is one of a heap. (Without that a heap of 10 000 that falls deals 47 000 blows
-  /// a step, most of them between the same pairs, in place of 11 000, and comes to rest neither sooner nor
-  /// better.)
-  template <class Scene>
-  S fallOf(const Scene& scene, std::uint32_t i, std::uint32_t j, const Vector3<S>& n) const {
-    const auto one = [&](std::uint32_t k) {
-      return history_[k].impacts >= scene.settings.mostSlow ? S(safeNorm(scene.freeAcceleration(k)))
-                                                            : scene.heldAlong(k, n);
-    };
-    return one(i) + (j == staticPartner ? S(0) : one(j));
-  }
-
   /// It does not bounce any more.
   template <class Scene>
   bool isDone(const Scene& scene, std::uint32_t body) const {

@@ -65,6 +65,10 @@ struct ImpactScene {
       return fall;
     }
   }
+  /// Of both sides; the second may be a boundary.
+  S heldAlong(std::uint32_t i, std::uint32_t j, const Vector3<S>& n) const {
+    return heldAlong(i, n) + (j == staticPartner ? S(0) : heldAlong(j, n));
+  }
   /// At t [s] since the start of the step; what nothing moves spins as it does in the frame.
   Vector3<S> spin(std::uint32_t i, const S& t) const {
     const Vector3<S> w = spinOf(bodies, i);
