@@ -55,6 +55,7 @@ struct BodyTree {
   std::vector<S> x, y, z, m;
   std::vector<std::uint32_t> body;  ///< the caller's index of each row
   std::vector<TreeCell<F>> cells;
+  std::vector<std::uint32_t> parents;  ///< of each cell; of the root: itself
   /// First cell of each group, and the end: no cell is in its parent's group, and parents come first.
   std::vector<std::size_t> levels;
 
@@ -132,12 +133,14 @@ struct BodyTree {
   /// alone whose order is another than in the last tree.
   void build(std::uint32_t leafSize) {
     cells.clear();
+    parents.clear();
     levels.clear();
     keys_.resize(size());
     if (size() == 0) {
       return;
     }
     cells.push_back({});
+    parents.push_back(0);
     cells[0].last = static_cast<std::uint32_t>(size());
     frames_.assign(1, Frame{assignKeys(0, cells[0].last), 0});
     smallest_ = frames_[0].edge * S(0x1p-40);
@@ -284,6 +287,7 @@ struct BodyTree {
       child.first = begin;
       child.last = end;
       cells.push_back(child);
+      parents.push_back(static_cast<std::uint32_t>(c));
       frames_.push_back({frame.edge * S(0.5), static_cast<std::uint8_t>(level + 1)});
       begin = end;
     }

@@ -149,7 +149,7 @@ class MultipoleWalk {
     // NOLINTNEXTLINE(bugprone-branch-clone): the order counts, the cheap test before the dear one
     if (pairs <= limits_.pairsBelowExpansion) {
       addNear(source, from.image);
-    } else if (isFar(sink, source, from.image)) {
+    } else if (isFar(c, s, from.image)) {
       far_.add(sink, from);
       ++count_.expansions;
     } else if (pairs <= limits_.pairsBelowSplit || (sink.isLeaf() && source.isLeaf())) {
@@ -181,7 +181,9 @@ class MultipoleWalk {
   }
 
   /// The same bits for a pair of cells seen from either: images come in pairs of opposite shifts.
-  bool isFar(const Cell& a, const Cell& b, std::uint32_t image) const {
+  bool isFar(std::uint32_t first, std::uint32_t second, std::uint32_t image) const {
+    const Cell& a = tree_.cells[first];
+    const Cell& b = tree_.cells[second];
     Vector3<F> r = a.centre - b.centre;
     if (image != 0) {
       const Vector3<S>& shift = shifts_[image];
@@ -195,20 +197,33 @@ class MultipoleWalk {
     }
     const F inverse_sq = F(1) / r_sq;
     const F pull = r_sq / (gap * gap);
-    return isAccurate(a, b, inverse_sq, pull) && isAccurate(b, a, inverse_sq, pull);
+    return isAccurate(first, b, inverse_sq, pull) && isAccurate(second, a, inverse_sq, pull);
   }
 
   /// (M / r^2) ((s + R) / r)^p / (1 - theta^2)^2 within the sink's allowance: s the radius of the source's
-  /// mass, R that of the sink. \param pull 1 / (r^2 (1 - theta^2)^2)
-  bool isAccurate(const Cell& source, const Cell& sink, const F& inverse_sq, const F& pull) const {
+  /// mass, R that of the sink, M of massAround(). \param pull 1 / (r^2 (1 - theta^2)^2)
+  bool isAccurate(std::uint32_t from, const Cell& sink, const F& inverse_sq, const F& pull) const {
+    const Cell& source = tree_.cells[from];
     const F reach = F(source.spread) + F(sink.radius);
     const F ratio_sq = reach * reach * inverse_sq;
-    F error = source.mass * pull;
+    F error = massAround(from, sink) * pull;
     error *= error;
     for (int k = 0; k < limits_.order; ++k) {
       error *= ratio_sq;
     }
     return error <= sink.weight * sink.weight;
+  }
+
+  /// The mass of a source; of one smaller than a leaf as a sink that of the largest cell around it that is
+  /// not larger than the sink. A leaf is not divided: it meets all parts of that cell, which lie in one
+  /// direction and err alike, so that each may have its share of the allowance only.
+  const F& massAround(std::uint32_t source, const Cell& sink) const {
+    if (sink.isLeaf()) {
+      while (source != 0 && tree_.cells[tree_.parents[source]].radius <= sink.radius) {
+        source = tree_.parents[source];
+      }
+    }
+    return tree_.cells[source].mass;
   }
 
   const Tree& tree_;

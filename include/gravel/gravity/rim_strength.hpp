@@ -56,11 +56,6 @@ class RimStrength {
     softening_sq_ = softening_sq;
     rim_ = F(1.5 * std::pow(1.5, -1.0 / order) - 0.5);
     strength_.assign(tree.size(), F(-1));
-    parent_.assign(tree.cells.size(), 0);
-    for (std::uint32_t c = 0; c < tree.cells.size(); ++c) {
-      const TreeCell<F>& cell = tree.cells[c];
-      std::fill_n(parent_.begin() + cell.child, cell.children, c);
-    }
   }
 
   /// Finds the acceleration of a group's bodies at rims, within a few ten per cent. Groups may be looked at
@@ -120,7 +115,7 @@ class RimStrength {
 
   /// Whether a place in a leaf is at its rim, or at that of a cell around it.
   bool isAtRim(const BodyTree<S, F>& tree, std::uint32_t c, const Vector3<F>& x) const {
-    for (; tree.cells[c].count() <= mostBodies; c = parent_[c]) {
+    for (; tree.cells[c].count() <= mostBodies; c = tree.parents[c]) {
       const F from = rim_ * F(tree.cells[c].radius);
       if (from > F(0) && (x - tree.cells[c].centre).squaredNorm() >= from * from) {
         return true;
@@ -184,7 +179,6 @@ class RimStrength {
   int order_ = 0;
   F rim_ = F(0);
   F softening_sq_ = F(0);
-  std::vector<std::uint32_t> parent_;
   std::vector<F> strength_;  ///< of each row; below 0 where it was not looked at
 };
 
