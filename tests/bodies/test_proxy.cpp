@@ -252,6 +252,29 @@ TEMPLATE_LIST_TEST_CASE("proxy: fixed bodies and tracers have no inverse mass", 
   CHECK(read[0].material() == MaterialId{42});
 }
 
+TEMPLATE_TEST_CASE("a loop over bodies meets each once, in their order, and writes through", "", SoA, AoS,
+                   AoSoA<4>) {
+  Bodies<double, TestType> bodies;
+  CHECK(bodies.begin() == bodies.end());
+  for (std::size_t i = 0; i < 7; ++i) {
+    Body<double> body;
+    body.mass = 1.0 + static_cast<double>(i);
+    bodies.add(body);
+  }
+  std::size_t count = 0;
+  for (auto body : bodies) {
+    CHECK(body.index() == count++);
+    body.radius() = 2 * body.mass();
+  }
+  CHECK(count == 7);
+  for (const auto body : std::as_const(bodies)) {
+    static_assert(std::is_same_v<decltype(body), const typename Bodies<double, TestType>::ConstProxy>);
+    CHECK(body.radius() == 2.0 * static_cast<double>(1 + body.index()));
+  }
+  static_assert(std::forward_iterator<decltype(bodies.begin())>);
+  CHECK(std::count_if(bodies.begin(), bodies.end(), [](auto body) { return body.mass() > 3; }) == 4);
+}
+
 // --- static
 // ---------------------------------------------------------------------------------------------------
 

@@ -3,6 +3,7 @@
 /// \file
 /// The container of bodies: a storage, stable ids, and the checks at the door.
 
+#include <gravel/bodies/body_iterator.hpp>
 #include <gravel/bodies/columns.hpp>
 #include <gravel/bodies/places_by_id.hpp>
 #include <gravel/bodies/proxy.hpp>
@@ -75,6 +76,10 @@ class Bodies {
   bool empty() const { return size() == 0; }
   Proxy operator[](std::size_t i) { return {&storage_, i}; }
   ConstProxy operator[](std::size_t i) const { return {&storage_, i}; }
+  auto begin() { return BodyIterator<Proxy>(&storage_, 0); }
+  auto end() { return BodyIterator<Proxy>(&storage_, size()); }
+  auto begin() const { return BodyIterator<ConstProxy>(&storage_, 0); }
+  auto end() const { return BodyIterator<ConstProxy>(&storage_, size()); }
   Storage& storage() { return storage_; }
   const Storage& storage() const { return storage_; }
 
