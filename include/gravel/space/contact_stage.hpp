@@ -7,6 +7,7 @@
 #include <gravel/contact/collision_outcome.hpp>
 #include <gravel/contact/contact_solver.hpp>
 #include <gravel/contact/impact_events.hpp>
+#include <gravel/contact/late_blows.hpp>
 #include <gravel/contact/narrow_phase.hpp>
 #include <gravel/core/profiler.hpp>
 #include <gravel/dynamics/boundary.hpp>
@@ -156,17 +157,23 @@ class ContactStage {
     record_.clear();
     firstActed_ = false;
     impacts_.clear();
+    late_.clear();
   }
+
+  /// The impacts of a drift are dealt; \param start [s] of it, since forces were last found.
+  void keepBlows(const Bodies& bodies, const Scalar& start);
+  /// Forces have been found anew, h [s] after that: what blows since then lacked is made up (LateBlows).
+  void makeUpBlows(Bodies& bodies, const Scalar& time, const Scalar& h);
 
   /// A part of the step is over that began `start` [s] after it. \param last  no other one follows
   void endPart(const Scalar& start, bool last);
 
   /// The first half of the step is solved; the solver keeps its impulses while it solves the second one.
   /// \param kick [s] for which the present accelerations acted on the velocities before that
-  void endFirstHalf(const ForceStage<Scalar, Layout>& force, const Bodies& bodies, const Scalar& kick) {
+  void endFirstHalf(const Bodies& bodies, const Scalar& kick) {
     firstActed_ = acted_;
     if (acted_) {
-      bookKick(force, bodies, kick);
+      bookKick(bodies, kick);
     }
   }
 
@@ -201,18 +208,7 @@ class ContactStage {
   template <class Pair>
   static bool renumber(const Bodies& bodies, Pair& pair);
 
-  /// The share of the first half step's impulses J in the work of gravity and the field over the step. Kicks
-  /// do the work m a.(v before + v after) kick/2, and the drift takes it out of the potential at the velocity
-  /// in between. What J changes in the drift and in all later kicks, but not in the first one, leaves
-  /// -J.a kick: with it booked, what rests or rolls loses nothing over a step, to rounding, and the ledger
-  /// closes to the order of the integrator. A hook's work is a mean over both ends and needs no share.
-  void bookKick(const ForceStage<Scalar, Layout>& force, const Bodies& bodies, const Scalar& kick) {
-    const Eigen::Array<Scalar, 2, 1> losses = solver_.workOn([&](std::uint32_t i) {
-      return Vector3<Scalar>(force.conservativeForce(bodies, i) * (bodies[i].inverseMass() * kick));
-    });
-    report_.restitutionLoss += losses[0];
-    report_.frictionLoss += losses[1];
-  }
+  void bookKick(const Bodies& bodies, const Scalar& kick);
 
   void colour(const Bodies& bodies, Profiler& profiler) {
     if (!coloured_) {
@@ -284,6 +280,7 @@ class ContactStage {
   std::uint64_t searchesForWalls_ = 0;  // of neighbours_, when nearWalls_ were last asked for
   NarrowPhase<Scalar> narrow_;
   ImpactEvents<Scalar> impacts_;
+  LateBlows<Scalar> late_;
   std::vector<ContactName> names_;
   std::vector<ContactKeys> settled_;
   Scalar gapStep_ = Scalar(0);  // [s] of nextGapStep()

@@ -133,4 +133,18 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
   report_.driftWork += blows.driftWork;
 }
 
+template <Real Scalar, class Layout>
+void ContactStage<Scalar, Layout>::keepBlows(const Bodies& bodies, const Scalar& start) {
+  late_.take(impacts_.impacts(), bodies, start, record_.impacts().size());
+}
+
+template <Real Scalar, class Layout>
+void ContactStage<Scalar, Layout>::makeUpBlows(Bodies& bodies, const Scalar& time, const Scalar& h) {
+  const std::size_t before = record_.impacts().size();
+  report_.restitutionLoss +=
+      late_.makeUp(bodies, domain, time, h, [&](std::size_t k) -> ContactImpulse<Scalar>& {
+        return k < before ? record_.impacts()[k].impulse : impacts_.impacts()[k - before].impulse;
+      });
+}
+
 }  // namespace gravel

@@ -12,9 +12,9 @@
 /// carries its weight in every part, so that nothing falls between two evaluations nor is thrown up by a kick
 /// of the whole step's gravity, as it would be if forces came as impulses at the ends alone (r-RESPA:
 /// Tuckerman, Berne & Martyna 1992, J. Chem. Phys. 97, 1990); without contacts both are the same map. A blow
-/// meets a_0, off by h da/dt, as in a step of one part: order 2. In a shear-periodic domain the drift is no
-/// straight line: there a held force and one that kicks at the ends differ by O(h^3) a step, so that with
-/// n > 1 order 2 is kept, but reversible the map is only up to that.
+/// meets a_0, off by h da/dt, as in a step of one part, until a_1 is known (LateBlows): order 2. In a
+/// shear-periodic domain the drift is no straight line: there a held force and one that kicks at the ends
+/// differ by O(h^3) a step, so that with n > 1 order 2 is kept, but reversible the map is only up to that.
 ///
 /// With several drifts a step: stages fly ahead and back (Yoshida's first one by 1.35 h, the next one by
 /// -1.70 h), through whatever is in the way, and none of them ends where what rests could be held. So a step
@@ -38,6 +38,7 @@ template <Real Scalar, class Layout>
 struct Space<Scalar, Layout>::Departure {
   Space* space;
   Scalar start;  ///< [s] since the start of the step
+  Scalar since;  ///< [s] since forces were last found
   Scalar h;
   Scalar middle;  ///< of the part, as a share of the step
   bool meets;     ///< anything can touch; if not, kick and drift are one pass
@@ -46,10 +47,11 @@ struct Space<Scalar, Layout>::Departure {
     if (!space->contacts().empty()) {
       space->contact_.drivePlanes(middle);
       space->resolveCollisions(true);
-      space->contact_.endFirstHalf(space->force_, space->bodies_, kick);
+      space->contact_.endFirstHalf(space->bodies_, kick);
     }
     space->contact_.strike(space->bodies_, space->config_, HillFrame<Scalar>(space->contact_.domain),
                            Scalar(space->time_ + start), h, space->profiler_);
+    space->contact_.keepBlows(space->bodies_, since);
   }
 };
 
@@ -144,7 +146,11 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
   };
   const char* const alone = contact_.reasonToSkip(bodies_);
   const bool quiet = hasSeveralDrifts() && !apart;
-  const Departure departure{this, start, contact_dt_, halves(2 * part + 1),
+  const Departure departure{this,
+                            start,
+                            apart ? Scalar(0) : start,
+                            contact_dt_,
+                            halves(2 * part + 1),
                             !quiet && (alone == nullptr || !contacts().empty())};
   if (!departure && alone != nullptr) {
     profiler_.skip(Phase::Impacts, alone);
@@ -168,13 +174,16 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
   }
   rememberPlaces();
   left_.correction += contact_.separationWork(force_, bodies_);
-  if (force_.hook && !held) {
-    const Scalar power = force_.hookPower(bodies_);
-    left_.work -= (hookPower_ + power) * (apart ? contact_dt_ : h) / Scalar(2);
+  if (!held) {
+    contact_.makeUpBlows(bodies_, Scalar(time_ + end), apart ? contact_dt_ : h);
   }
   const std::vector<std::pair<BodyId, BodyId>> merges = decideCollisions(Scalar(time_ + end));
   contact_.drivePlanes(halves(2 * part + 2));
   resolveCollisions();
+  if (force_.hook && !held) {
+    const Scalar power = force_.hookPower(bodies_);
+    left_.work -= (hookPower_ + power) * (apart ? contact_dt_ : h) / Scalar(2);
+  }
   contact_.endPart(start, last);
   mergeCollided(merges, Scalar(time_ + end));
   if (!last && !merges.empty()) {

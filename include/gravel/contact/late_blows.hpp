@@ -1,0 +1,107 @@
+#pragma once
+
+/// \file
+/// What blows lack until the forces of the end of their step are known.
+
+#include <gravel/contact/impact.hpp>
+#include <gravel/spatial/domain.hpp>
+
+#include <span>
+#include <vector>
+
+namespace gravel {
+
+/// A blow at t meets v_m + a_0 (t - h/2): v_m the velocity of the drift, a_0 the acceleration of the step's
+/// start. Turned round, the step would deal it at v_m + a_1 (t - h/2), with the one of its end. What falls
+/// back after a bounce is pulled the same way in every such step, so that the difference has one sign: two
+/// elastic spheres that bounce under their own gravity lost or gained O(h^2) of their energy in every blow.
+/// By the mean of both accelerations a blow is the same both ways, and there is no drift. So the approach
+/// speed u lacks
+///     du = -n.(a_1 - a_0) (t - h/2)/2
+/// and the pair's parting speed (J_n/m* u) du, which is made up when a_1 is known: along the line of centres
+/// of that moment, for angular momentum's sake. Blows after which a pair stays together, those that somebody
+/// else decides about, and friction are left as they are; and so is a pair that has turned by more than 60
+/// degrees since. In a uniform field a_1 = a_0, and nothing changes.
+template <Real S>
+class LateBlows {
+ public:
+  void clear() { blows_.clear(); }
+
+  /// Takes up blows of a drift that is still to come. \param bodies with the accelerations a_0
+  /// \param start [s] of their times, since a_0 was found  \param place of the first in the list of the step
+  template <ContactBodies B>
+  void take(std::span<const Impact<S>> impacts, const B& bodies, const S& start, std::size_t place) {
+    for (const Impact<S>& impact : impacts) {
+      if (!impact.rests && !impact.decided && impact.speed > S(0)) {
+        blows_.push_back({impact.first, impact.second, place, impact.normal, pull(bodies, impact),
+                          S(start + impact.time), impact.speed});
+      }
+      ++place;
+    }
+  }
+
+  /// Makes up for all that were taken. \param bodies with the accelerations a_1, at the end of the step
+  /// \param time [s] of that, for a sheared domain  \param h [s] from a_0 to a_1
+  /// \param impulseOf  the impulse of the blow of a place  \return loss to restitution [J]
+  template <ContactBodies B, class ImpulseOf>
+  S makeUp(B& bodies, const Domain<S>& domain, const S& time, const S& h, ImpulseOf&& impulseOf) {
+    S loss(0);
+    for (const Blow& blow : blows_) {
+      const bool boundary = blow.second == staticPartner;
+      Vector3<S> n = blow.normal;
+      if (!boundary) {
+        n = domain.minimumImage(
+            Vector3<S>(Vector3<S>(bodies.positions()[blow.second]) - bodies.positions()[blow.first]), time);
+        n = detail::safeUnit(n);
+      }
+      const S du = (blow.pull - pull(bodies, blow)) * (blow.time - h / S(2)) / S(2);
+      const MassShares<S> share =
+          massShares<S>(S(bodies.masses()[blow.first]), detail::isMovable(bodies, blow.first),
+                        boundary ? S(0) : S(bodies.masses()[blow.second]),
+                        !boundary && detail::isMovable(bodies, blow.second));
+      if (du == S(0) || !(S(2) * n.dot(blow.normal) > S(1)) || !(share.effective > S(0))) {
+        continue;
+      }
+      S& jn = impulseOf(blow.place).normal;
+      const S kept = jn / (share.effective * blow.speed) - S(1);  // coefficient of restitution
+      const S dv = (S(1) + kept) * du;
+      if (share.first > S(0)) {
+        bodies.velocities()[blow.first] -= Vector3<S>((share.first * dv) * n);
+      }
+      if (share.second > S(0)) {
+        bodies.velocities()[blow.second] += Vector3<S>((share.second * dv) * n);
+      }
+      jn += share.effective * dv;
+      loss += share.effective * (S(1) - kept * kept) * blow.speed * du;
+    }
+    blows_.clear();
+    return loss;
+  }
+
+ private:
+  struct Blow {
+    std::uint32_t first;
+    std::uint32_t second;
+    std::size_t place;
+    Vector3<S> normal;
+    S pull;  ///< [m s^-2] n.(a_2 - a_1) of the two bodies
+    S time;  ///< [s]
+    S speed;
+  };
+
+  template <class B, class Pair>
+  static S pull(const B& bodies, const Pair& pair) {
+    S along(0);
+    if (pair.second != staticPartner && detail::isMovable(bodies, pair.second)) {
+      along += pair.normal.dot(Vector3<S>(bodies.accelerations()[pair.second]));
+    }
+    if (detail::isMovable(bodies, pair.first)) {
+      along -= pair.normal.dot(Vector3<S>(bodies.accelerations()[pair.first]));
+    }
+    return along;
+  }
+
+  std::vector<Blow> blows_;
+};
+
+}  // namespace gravel
