@@ -28,6 +28,28 @@ struct WalkCount {
   }
 };
 
+/// A lower bound (G = 1) of the mean potential of a body by mass: what two children of a cell have of each
+/// other they have at distances of at most its diameter, and so have the bodies of a leaf.
+template <class S, class F>
+F leastMeanPotential(const BodyTree<S, F>& tree, const F& softening_sq) {
+  using std::sqrt;
+  F sum(0);
+  for (const TreeCell<F>& cell : tree.cells) {
+    F squares(0);
+    for (std::uint32_t row = cell.first; cell.isLeaf() && row < cell.last; ++row) {
+      squares += F(tree.m[row]) * F(tree.m[row]);
+    }
+    for (std::uint32_t child = cell.child; child < cell.child + cell.children; ++child) {
+      squares += tree.cells[child].mass * tree.cells[child].mass;
+    }
+    const F widest = F(sqrt(F(F(4) * F(cell.radius) * F(cell.radius) + softening_sq)));
+    if (widest > F(0)) {
+      sum += (cell.mass * cell.mass - squares) / widest;
+    }
+  }
+  return tree.cells[0].mass > F(0) ? F(sum / tree.cells[0].mass) : F(0);
+}
+
 /// Descends through the cells as sinks, depth first. A cell meets the sources that were too near for its
 /// parent: it takes the expansion of those far away, sums those of few bodies one by one, opens those that
 /// are larger than itself, and leaves the rest to its children. Each direction of a pair of cells is decided
@@ -39,14 +61,17 @@ class MultipoleWalk {
   using Moments = TreeMoments<S, F, Terms>;
 
   /// \param shifts of the images that are sources, first that of the cells themselves, zero
+  /// \param deviation  what the potential may err by from a pair of cells, if it is found
   MultipoleWalk(const Tree& tree, const Moments& moments, const std::vector<Vector3<S>>& shifts,
-                const WalkLimits& limits, const S& softening_sq, SinkFields<S>& out)
+                const WalkLimits& limits, const S& softening_sq, const F& deviation, SinkFields<S>& out)
       : tree_(tree),
         shifts_(shifts),
         limits_(limits),
         softening_sq_(softening_sq),
         out_(out),
-        far_(tree, moments, shifts, limits.order, out.potential.empty() ? 1 : 0, softening_sq) {}
+        far_(tree, moments, shifts, limits.order, out.potential.empty() ? 1 : 0, softening_sq),
+        withPotential_(!out.potential.empty()),
+        deviation_(deviation) {}
 
   /// Where a walk can be taken up again: a cell, what its parent left it of the local expansion, and the
   /// sources that it has to meet.
@@ -211,7 +236,10 @@ class MultipoleWalk {
     for (int k = 0; k < limits_.order; ++k) {
       error *= ratio_sq;
     }
-    return error <= sink.weight * sink.weight;
+    // An error E of the force is one of E r in the potential. In dense clusters far from each other the pull
+    // is strong, and allows E too much for that.
+    return error <= sink.weight * sink.weight &&
+           (!withPotential_ || error <= deviation_ * deviation_ * inverse_sq);
   }
 
   /// The mass of a source; of one smaller than a leaf as a sink that of the largest cell around it that is
@@ -236,6 +264,8 @@ class MultipoleWalk {
   std::vector<F> locals_;  ///< of the cells on the path and their siblings
   FarField<S, F, Terms> far_;
   NearField<S> near_;
+  bool withPotential_;
+  F deviation_;
   std::vector<Start>* prepared_ = nullptr;
   std::uint32_t handOver_ = 0;
   WalkCount count_;
