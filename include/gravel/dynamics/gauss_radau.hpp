@@ -9,6 +9,7 @@
 #include <gravel/dynamics/integrator.hpp>
 
 #include <algorithm>
+#include <stdexcept>
 
 namespace gravel {
 
@@ -25,6 +26,15 @@ namespace gravel {
 /// truncation is below rounding; a step that comes out four times too long is taken again. Sums are
 /// compensated; energy errors then grow as the square root of the number of steps.
 ///
+/// Where pulls cancel, as on a star amid evenly spread planets, a is their rounding: its changes do not
+/// shrink with dt, so that its derivatives seem to grow without end. A body has no say where a changes within
+/// dt by no more than the larger of
+///   16 eps max |a| over bodies,  of sums of pulls as large as the largest acceleration;
+///   eps |x| / dt^2,              of pulls from rounded places: the change moves the body by less than that.
+/// What moves faster than the rest and is overlooked has an orbit of some 100 eps of the larger of |x| and
+/// the path of the body of largest a. A fixed body's place counts as |x| of all: it pulls without an a of its
+/// own.
+///
 /// Here the polynomial is held by its values at the nodes, not by its coefficients: a prediction costs seven
 /// multiplications a coordinate, and no coefficient accumulates rounding.
 ///
@@ -39,26 +49,39 @@ class GaussRadau15 {
   /// those of the present positions, and are at the end.
   /// \param forces  called with the time that has passed [s]; sets accelerations at the present positions
   /// \param velocities  the forces depend on velocities: these are predicted as well
+  /// \throws std::runtime_error if a hundred steps in a row come down to the rounding of time: forces that
+  ///   jump, or grow without end. The bodies then stand where the last step left them
   template <class Layout, class Forces>
   void advance(Bodies<Scalar, Layout>& bodies, const Scalar& h, bool velocities, Forces&& forces) {
+    const Scalar eps = std::numeric_limits<Scalar>::epsilon();
     begin(bodies);
     Scalar done(0);
+    int stuck = 0;  // steps in a row that cannot be shorter
     Scalar wanted = last_.next > Scalar(0) ? last_.next : firstStep(bodies, h);
     while (done < h) {
       const Scalar rest = h - done;
       const bool last = !(wanted < rest);
       const Scalar dt = last ? rest : rest < Scalar(2) * wanted ? Scalar(rest / Scalar(2)) : wanted;
       const Scalar ratio = attempt(bodies, dt, done, velocities, forces);
+      // Shorter than that, steps do not add up; two lumps of mass may pass so close, for a moment.
+      const Scalar shortest = eps * std::max<Scalar>(done, eps * h);
       wanted = dt * std::clamp<Scalar>(ratio, Scalar(1e-3), Scalar(4));
-      if (ratio < Scalar(0.25) && done + wanted > done) {
+      if (ratio < Scalar(0.25) && wanted > shortest) {
         ++rejected_;
         continue;
       }
+      stuck = wanted > shortest ? 0 : stuck + 1;
+      wanted = std::max<Scalar>(wanted, shortest);
       done = last ? h : Scalar(done + dt);
       accept(bodies, dt);
       ++taken_;
       forces(done);
       takeAccelerations(bodies, a0_);
+      if (stuck == 100) {
+        throw std::runtime_error(
+            "gravel: Gauss-Radau's steps have come down to the rounding of time: its forces must be finite "
+            "and smooth");
+      }
     }
     last_.next = wanted;
   }
@@ -169,9 +192,10 @@ class GaussRadau15 {
     const Scalar dt_sq = dt * dt;
     const Scalar half = Scalar(1) / Scalar(2);
     Scalar before(0);
+    Scalar size(0);
     for (int iteration = 1; iteration <= 12; ++iteration) {
       Scalar change(0);
-      Scalar size(0);
+      size = Scalar(0);
       for (std::size_t n = 0; n < nodes; ++n) {
         const Scalar s = Scalar(Tables::node[n]);
         const Scalar s_sq = s * s * half * dt_sq;
@@ -203,16 +227,30 @@ class GaussRadau15 {
       }
       before = change;
     }
-    return stepWanted();
+    return stepWanted(bodies, dt_sq, size);
   }
 
-  Scalar stepWanted() {
+  /// \param largest  acceleration in this step  \return the step wanted over dt
+  template <class Layout>
+  Scalar stepWanted(const Bodies<Scalar, Layout>& bodies, const Scalar& dt_sq, const Scalar& largest) {
     using std::sqrt;
     dx_ = detail::dot(F_, weights_.jerk);
     dv_ = detail::dot(F_, weights_.snap);
     xTermLow_ = detail::dot(F_, weights_.crackle);
     const auto squared = [](const auto& v) { return Scalar(v.square().sum()); };
     const auto root = [](const Scalar& x) { return x > Scalar(0) ? Scalar(sqrt(x)) : Scalar(0); };
+    const Scalar eps = std::numeric_limits<Scalar>::epsilon();
+    const auto isRounding = [&](Eigen::Index at) {
+      Scalar change(0);
+      for (const Column& f : F_) {
+        change = std::max<Scalar>(change, f.template segment<3>(at).abs().maxCoeff());
+      }
+      // Places at the start and at the last node.
+      const Scalar now = bodies.positions()[static_cast<std::size_t>(at / 3)].cwiseAbs().maxCoeff();
+      const Scalar place = std::max<Scalar>(now, last_.x.template segment<3>(at).abs().maxCoeff());
+      return change <= Scalar(16) * eps * largest ||
+             change * dt_sq <= eps * std::max<Scalar>(place, last_.fixedPlace);
+    };
     Scalar least(-1);
     for (Eigen::Index at = 0; at < last_.x.size(); at += 3) {
       const Scalar a = root(squared(a0_.template segment<3>(at) + F_[nodes - 1].template segment<3>(at)));
@@ -222,7 +260,9 @@ class GaussRadau15 {
       const Scalar slower = s_sq + root(j_sq * squared(xTermLow_.template segment<3>(at)));
       if (slow > Scalar(0) && slower > Scalar(0)) {
         const Scalar t_sq = std::max<Scalar>(Scalar(2) * a * a / slow, slow / slower);
-        least = least < Scalar(0) || t_sq < least ? t_sq : least;
+        if ((least < Scalar(0) || t_sq < least) && !isRounding(at)) {
+          least = t_sq;
+        }
       }
     }
     return least < Scalar(0) ? Scalar(4) : Scalar(eta_ * sqrt(least));

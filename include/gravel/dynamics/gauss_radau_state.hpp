@@ -18,11 +18,12 @@ struct RadauState {
   using Column = Eigen::Array<Scalar, Eigen::Dynamic, 1>;
   using Columns = std::array<Column, nodes>;
 
-  Column x, v;              ///< where the last step left the bodies
-  Column xLow, vLow;        ///< their lost parts
-  Columns b, e;             ///< coefficients of the last step, as found and as predicted
-  Scalar next = Scalar(0);  ///< [s] that the last step asks for
-  Scalar step = Scalar(0);  ///< [s] of the last step; 0: there is none
+  Column x, v;                    ///< where the last step left the bodies
+  Column xLow, vLow;              ///< their lost parts
+  Columns b, e;                   ///< coefficients of the last step, as found and as predicted
+  Scalar next = Scalar(0);        ///< [s] that the last step asks for
+  Scalar step = Scalar(0);        ///< [s] of the last step; 0: there is none
+  Scalar fixedPlace = Scalar(0);  ///< [m] the largest coordinate of fixed bodies
 
   static void clear(Columns& columns) {
     for (Column& c : columns) {
@@ -45,7 +46,11 @@ struct RadauState {
       }
       seen = now.array();
     };
+    fixedPlace = Scalar(0);
     for (std::size_t i = 0; i < bodies.size(); ++i) {
+      if (bodies[i].isFixed()) {
+        fixedPlace = std::max<Scalar>(fixedPlace, bodies.positions()[i].cwiseAbs().maxCoeff());
+      }
       const auto at = static_cast<Eigen::Index>(3 * i);
       compare(x.template segment<3>(at), xLow.template segment<3>(at), bodies.positions()[i]);
       compare(v.template segment<3>(at), vLow.template segment<3>(at), bodies[i].countingVelocity());

@@ -7,6 +7,7 @@
 #include <gravel/dynamics/hermite_state.hpp>
 
 #include <algorithm>
+#include <span>
 
 namespace gravel {
 
@@ -18,6 +19,9 @@ namespace gravel {
 /// them the next step (Aarseth 1985),
 ///   dt = sqrt(eta (|a| |a''| + |a'|^2) / (|a'| |a'''| + |a''|^2)),
 /// rounded down to a power of two; it is doubled at most, and only where blocks of the double length begin.
+/// Where pulls cancel, as on a star amid evenly spread planets, a is their rounding, and its differences over
+/// a shorter step seem to change faster, without end. But pulls change no faster than the fastest pair: a
+/// step that is to become shorter is no shorter than sqrt(eta)/8 over the rate of that, half of a first step.
 /// At the end of h all bodies are at the same time.
 ///
 /// The forces are an object, as JerkSum is, with
@@ -150,17 +154,21 @@ class Hermite4 {
     }
   }
 
-  /// Accelerations, jerks and first steps of all bodies, a quarter of what a circular orbit would get.
+  /// By the rate of the fastest pair, a quarter of what a circular orbit would get; `free` without any.
+  Scalar stepOfPair(const Scalar& rate_sq, const Scalar& free) const {
+    using std::sqrt;
+    return rate_sq > Scalar(0) ? Scalar(sqrt(Scalar(eta_ / rate_sq)) / Scalar(4)) : free;
+  }
+
+  /// Accelerations, jerks and first steps of all bodies.
   template <class Forces>
   void start(const Scalar& h, const Vector3<Scalar>& field, Forces&& forces) {
-    using std::sqrt;
     xp_ = s_.x;
     vp_ = s_.v;
     forces.evaluate(s_.movable, xp_, vp_, s_.a, s_.j);
     forces.rates(s_.movable, xp_, vp_, s_.wanted);
     for (const std::uint32_t row : s_.movable) {
-      const Scalar rate_sq = s_.wanted[row];
-      s_.wanted[row] = rate_sq > Scalar(0) ? Scalar(sqrt(Scalar(eta_ / rate_sq)) / Scalar(4)) : h;
+      s_.wanted[row] = stepOfPair(Scalar(s_.wanted[row]), h);
       for (std::size_t c = 0; c < 3; ++c) {
         s_.a[c][row] += field[static_cast<Eigen::Index>(c)];
       }
@@ -194,7 +202,7 @@ class Hermite4 {
       }
     }
     for (const std::uint32_t row : active_) {
-      settle(row, h, next, field);
+      settle(row, h, next, field, forces);
     }
     if (shared_) {
       share(active_, deepest());
@@ -236,7 +244,8 @@ class Hermite4 {
   }
 
   /// Takes up the corrected motion and finds the next step.
-  void settle(std::uint32_t row, const Scalar& h, Tick next, const Vector3<Scalar>& field) {
+  template <class Forces>
+  void settle(std::uint32_t row, const Scalar& h, Tick next, const Vector3<Scalar>& field, Forces&& forces) {
     using std::sqrt;
     const Level level = s_.level[row];
     const Scalar dt = lengthOf(level, h);
@@ -268,6 +277,13 @@ class Hermite4 {
       s_.wanted[row] = fast * Scalar(4) < eta_ * slow || !(fast > Scalar(0))
                            ? twice
                            : Scalar(dt * sqrt(Scalar(eta_ * slow / fast)));
+      // Shorter: an encounter, or an acceleration that is rounding. Pairs tell.
+      if (s_.wanted[row] < dt) {
+        rate_sq_.resize(s_.m.size());
+        forces.rates(std::span<const std::uint32_t>(&row, 1), xp_, vp_, rate_sq_);
+        const Scalar floor = stepOfPair(Scalar(rate_sq_[row]), twice) / Scalar(2);
+        s_.wanted[row] = std::max<Scalar>(s_.wanted[row], std::min<Scalar>(twice, floor));
+      }
     }
     Level after = levelFor(s_.wanted[row], h, level);
     if (level > 0 && !(s_.wanted[row] < twice) && (next & (ticks(Level(level - 1)) - 1)) == 0) {
@@ -282,6 +298,7 @@ class Hermite4 {
   Columns xp_, vp_;  // predicted, and corrected
   Columns a1_, j1_;  // there
   Column age_;       // [s] since the start of each row's step
+  Column rate_sq_;   // [s^-2] of the fastest pair, where asked for
   std::vector<std::uint32_t> active_;
   std::size_t inLevel_[deepestLevel + 1] = {};
   Scalar eta_ = Scalar(0.02);
