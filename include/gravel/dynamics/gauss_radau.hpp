@@ -53,7 +53,7 @@ class GaussRadau15 {
   ///   jump, or grow without end. The bodies then stand where the last step left them
   template <class Layout, class Forces>
   void advance(Bodies<Scalar, Layout>& bodies, const Scalar& h, bool velocities, Forces&& forces) {
-    const Scalar eps = std::numeric_limits<Scalar>::epsilon();
+    const Scalar eps = Eigen::NumTraits<Scalar>::epsilon();
     begin(bodies);
     Scalar done(0);
     int stuck = 0;  // steps in a row that cannot be shorter
@@ -220,7 +220,7 @@ class GaussRadau15 {
       }
       ++iterations_;
       // What is left is the change times the rate at which changes shrink.
-      const Scalar least = std::numeric_limits<Scalar>::epsilon() * size / Scalar(64);
+      const Scalar least = Eigen::NumTraits<Scalar>::epsilon() * size / Scalar(64);
       if (!(change > least) || (iteration > 1 && change * change <= least * before) ||
           (iteration > 2 && !(change < before))) {
         break;
@@ -239,7 +239,7 @@ class GaussRadau15 {
     xTermLow_ = detail::dot(F_, weights_.crackle);
     const auto squared = [](const auto& v) { return Scalar(v.square().sum()); };
     const auto root = [](const Scalar& x) { return x > Scalar(0) ? Scalar(sqrt(x)) : Scalar(0); };
-    const Scalar eps = std::numeric_limits<Scalar>::epsilon();
+    const Scalar eps = Eigen::NumTraits<Scalar>::epsilon();
     const auto isRounding = [&](Eigen::Index at) {
       Scalar change(0);
       for (const Column& f : F_) {
