@@ -114,8 +114,8 @@ class DirectSum : public detail::DirectRows<S> {
       S a[3] = {S(0), S(0), S(0)};
       S far(0);
       farImages_.gather(images_, table_.x.data(), table_.y.data(), table_.z.data(), table_.m.data(), n);
-      farImages_.addTo(1, &table_.x[own], &table_.y[own], &table_.z[own], a, a + 1, a + 2, &far);
-      sum += far - table_.m[own] * S(images_.derivatives()[0]) / S(2);
+      farImages_.addTo(images_, 1, &table_.x[own], &table_.y[own], &table_.z[own], a, a + 1, a + 2, &far);
+      sum += far - table_.m[own] * S(images_.ownPotential()) / S(2);
     }
     return -units_.energy(G)(S(table_.m[own] * sum));
   }
@@ -205,8 +205,8 @@ class DirectSum : public detail::DirectRows<S> {
     farImages_.gather(images_, table_.x.data(), table_.y.data(), table_.z.data(), table_.m.data(), n);
     for (const auto& [begin, last] : {std::pair{std::size_t{0}, n}, std::pair{tracerBegin_, table_.size()}}) {
       const auto at = [from = begin](auto& column) { return column.data() + from; };
-      farImages_.addTo(last - begin, at(table_.x), at(table_.y), at(table_.z), at(table_.ax), at(table_.ay),
-                       at(table_.az), nullptr);
+      farImages_.addTo(images_, last - begin, at(table_.x), at(table_.y), at(table_.z), at(table_.ax),
+                       at(table_.ay), at(table_.az), nullptr);
     }
   }
 
@@ -225,8 +225,8 @@ class DirectSum : public detail::DirectRows<S> {
     farImages_.gather(images_, table_.x.data(), table_.y.data(), table_.z.data(), table_.m.data(), n);
     table_.clearAccelerations();
     std::vector<S> potential(n, S(0));
-    farImages_.addTo(n, table_.x.data(), table_.y.data(), table_.z.data(), table_.ax.data(), table_.ay.data(),
-                     table_.az.data(), potential.data());
+    farImages_.addTo(images_, n, table_.x.data(), table_.y.data(), table_.z.data(), table_.ax.data(),
+                     table_.ay.data(), table_.az.data(), potential.data());
     S sum(0);
     for (const S& part : parts) {
       sum += part;

@@ -166,8 +166,8 @@ class FastMultipole {
       count_ += done;
     }
     if (!images_.isOpen()) {
-      farImages_.addTo(tree_.size(), tree_.x.data(), tree_.y.data(), tree_.z.data(), fields_.ax.data(),
-                       fields_.ay.data(), fields_.az.data(),
+      farImages_.addTo(images_, tree_.size(), tree_.x.data(), tree_.y.data(), tree_.z.data(),
+                       fields_.ax.data(), fields_.ay.data(), fields_.az.data(),
                        fields_.potential.empty() ? nullptr : fields_.potential.data());
     }
   }

@@ -63,8 +63,8 @@ class FieldStrength {
                    isUneven_[g] != 0 ? &around : nullptr);
         }
         if (!images.isOpen()) {
-          around.far += field.at(group.centre);
-          a += field.at(group.centre);
+          around.far += field.at(images, group.centre);
+          a += field.at(images, group.centre);
         }
         strength_[g] = F(a.norm());
         if (isUneven_[g] != 0) {

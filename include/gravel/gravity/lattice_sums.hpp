@@ -5,6 +5,7 @@
 /// potential near the source.
 
 #include <gravel/gravity/expansion.hpp>
+#include <gravel/gravity/lattice_weights.hpp>
 
 #include <vector>
 
@@ -102,6 +103,65 @@ class LatticeSums {
     return sums.total_;
   }
 
+  /// The distance of the nearest point beyond the middle of such a lattice.
+  static T beyondMiddle(const Vector3<T>& a, const Vector3<T>& b) {
+    using std::sqrt;
+    const int middle[2] = {middleOf(a, b), middleOf(b, a)};
+    T least_sq = T(9 * middle[0] * middle[0]) * a.squaredNorm();
+    forHalf({2 * middle[0] + 1, 2 * middle[1] + 1, 0}, a, b, [&](const Point& p, const Vector3<T>& s) {
+      if (std::abs(p[0]) > middle[0] || std::abs(p[1]) > middle[1]) {
+        least_sq = std::min<T>(least_sq, s.squaredNorm());
+      }
+    });
+    return T(sqrt(least_sq));
+  }
+
+  /// The D_k of that lattice, of odd order too, seen from (0, 0, z), z > 0. Its whole potential is, by
+  /// Poisson's formula, with A the area of a cell and q = 2 pi/A (i b_y - j a_y, j a_x - i b_x, 0),
+  ///     K(r) = -2 pi z/A + sum over i, j but (0, 0) of 2 pi/(A q) e^(-q z) cos(q.r),
+  /// of the same zero as in `plane`, so that
+  ///     D_k = d^k K(0, 0, z) - sum over near s of D_k((0, 0, z) - s).
+  /// The waves left out are below 1e-18 |k|!/z^(|k|+1). Errs by rounding of the near terms, at most
+  /// |k|!/z^(|k|+1) each: good for bodies that are apart in z by about as much as in the plane, or more.
+  /// \param near the near points, the origin among them
+  static std::vector<T> planeAbove(const Vector3<T>& a, const Vector3<T>& b, const T& z, int order,
+                                   const std::vector<Vector3<T>>& near) {
+    using std::sqrt;
+    LatticeSums sums(order);
+    const T circle = T(2) * pi<T>();
+    const T area = a[0] * b[1] - a[1] * b[0];
+    const T most = T(45.0 + 2.2 * order) / z;
+    const auto reach = [&most, &circle](const Vector3<T>& edge) {  // q.a = 2 pi i
+      int n = 0;
+      while (T(n) * circle <= most * T(sqrt(T(edge.squaredNorm())))) {
+        ++n;
+      }
+      return n;
+    };
+    forHalf({reach(a), reach(b), 0}, Vector3<T>(circle / area * b[1], -(circle / area * b[0]), T(0)),
+            Vector3<T>(-(circle / area * a[1]), circle / area * a[0], T(0)),
+            [&](const Point&, const Vector3<T>& wave) {
+              const T q = T(sqrt(T(wave.squaredNorm())));
+              if (q <= most) {
+                sums.addWave(wave, q, T(T(2) * circle / (area * q) * negativeExponential(T(q * z))));
+              }
+            });
+    sums.total_[0] -= circle * z / area;
+    sums.total_[at(D::row(1, 1))] -= circle / area;
+    for (int n = 2; n <= order; ++n) {
+      X::fillTrace(n, sums.total_.data());
+    }
+    for (const Vector3<T>& s : near) {
+      const T s_sq = s.squaredNorm() + z * z;
+      X::derivatives(order, T(-s[0]), T(-s[1]), z, T(T(-1) / s_sq), T(T(1) / T(sqrt(s_sq))),
+                     sums.one_.data());
+      for (std::size_t k = 0; k < sums.total_.size(); ++k) {
+        sums.total_[k] -= sums.one_[k];
+      }
+    }
+    return sums.total_;
+  }
+
  private:
   using X = Expansion<HarmonicTerms>;
   using M = HarmonicTerms::Moments;
@@ -122,6 +182,26 @@ class LatticeSums {
         for (int b = 0; b <= n - c; b += allSigns ? 2 : 1) {
           const std::size_t k = at(D::row(n, c) + b);
           total_[k] += weights[at(n)] * one_[k];
+        }
+      }
+    }
+  }
+
+  /// Adds the derivatives of weight e^(-q z) cos(wave.r) at the origin but for the rows c = 2.
+  void addWave(const Vector3<T>& wave, const T& q, const T& weight) {
+    std::vector<T> x(at(order_ + 1), weight);  // weight wave_x^n
+    std::vector<T> y(x.size(), T(1));
+    for (std::size_t n = 1; n < x.size(); ++n) {
+      x[n] = x[n - 1] * wave[0];
+      y[n] = y[n - 1] * wave[1];
+    }
+    for (int n = 0; n <= order_; ++n) {
+      for (int c = 0; c <= M::lastZ(n); ++c) {
+        if ((n - c) % 2 == 0) {  // of an odd order in the plane it is a sine
+          const T sign = T(((n - c) / 2) % 2 == 0 ? 1 : -1) * (c == 0 ? T(1) : T(-q));
+          for (int b = 0; b <= n - c; ++b) {
+            total_[at(D::row(n, c) + b)] += sign * x[at(n - c - b)] * y[at(b)];
+          }
         }
       }
     }
@@ -175,51 +255,6 @@ class LatticeSums {
       for (int j = i == 0 ? 1 : -bound[1]; j <= bound[1]; ++j) {
         visit(Point{i, j, 0}, Vector3<T>(T(i) * a + T(j) * b));
       }
-    }
-  }
-
-  /// shares[n] = P(n + 1/2, x), from the highest n down: P(a, x) = P(a + 1, x) + x^a e^-x / Gamma(a + 1).
-  static void gammaShares(const T& x, std::vector<T>& shares) {
-    using std::sqrt;
-    T term = T(2) * T(sqrt(T(x / pi<T>()))) * negativeExponential(x);
-    shares[0] = term;
-    for (std::size_t n = 1; n < shares.size(); ++n) {
-      term *= x / (T(static_cast<double>(n)) + T(0.5));
-      shares[n] = term;
-    }
-    T a = T(static_cast<double>(shares.size())) - T(0.5);
-    T sum = term;
-    while (term > sum * T(1e-22)) {
-      a += T(1);
-      term *= x / a;
-      sum += term;
-    }
-    shares.back() = sum;
-    for (std::size_t n = shares.size() - 1; n-- > 0;) {
-      shares[n] += shares[n + 1];
-    }
-  }
-
-  /// e^-x for x >= 0; by its series and squares for a scalar that need not have exp().
-  static T negativeExponential(T x) {
-    if constexpr (std::is_floating_point_v<T>) {
-      return std::exp(-x);
-    } else {
-      int halvings = 0;
-      for (; x > T(0.5); ++halvings) {
-        x /= T(2);
-      }
-      T term(1);
-      T sum(1);
-      for (int n = 1; n <= 24; ++n) {
-        term *= x / T(n);
-        sum += term;
-      }
-      sum = T(1) / sum;
-      for (; halvings > 0; --halvings) {
-        sum *= sum;
-      }
-      return sum;
     }
   }
 

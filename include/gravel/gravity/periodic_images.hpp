@@ -3,32 +3,18 @@
 /// \file
 /// The images of a periodic system: which are near and summed one by one, and what all the others do.
 
+#include <gravel/gravity/image_plan.hpp>
 #include <gravel/gravity/lattice_sums.hpp>
 #include <gravel/spatial/domain.hpp>
 
 namespace gravel::detail {
 
-/// How far images are near, and the order of the expansion of all others, for one band of tolerances.
-/// Measured; see docs/theory-gravity.md.
-struct ImagePlan {
-  double tolerance;  ///< smallest that this row serves
-  double reach;      ///< images are near within so many diagonals of the box
-  int order;
-};
-
-inline constexpr std::array<ImagePlan, 8> imagePlans{{
-    {1e-2, 1.42, 10},
-    {1e-3, 1.42, 14},
-    {1e-4, 1.42, 18},
-    {1e-5, 1.42, 22},
-    {1e-6, 1.74, 22},
-    {1e-7, 1.74, 26},
-    {1e-9, 1.74, 32},
-    {0.0, 1.74, 36},
-}};
-
 /// The lattice of images of a domain: of the whole box in a periodic one; of its x (sheared) and y in a
 /// shear-periodic one, which gravity sees open in z. S is the scalar of bodies, F that of expansions.
+///
+/// A patch that is deep beside its width is cut into slabs, numbered from the lowest body up. What is near is
+/// then a matter of the box alone, and far images of one slab act on another through an expansion about the
+/// centres of both. See docs/theory-gravity.md.
 template <Real S, Real F>
 class PeriodicImages {
  public:
@@ -68,65 +54,205 @@ class PeriodicImages {
     if (isOpen()) {
       shifts_.assign(1, Vector3<S>::Zero());
       kind_ = DomainKind::Open;
+      isDeep_ = false;
       return;
     }
-    const ImagePlan& plan = planFor(tolerance);
+    const ImagePlan& plan = planImages(tolerance);
     const Vector3<S> edges = box() * perLength;
-    const S depth = isPlane() ? S((high - low) * perLength) : edges[2];
+    S depth = isPlane() ? S((high - low) * perLength) : edges[2];
     centre_ = isPlane() ? F((high + low) * perLength / S(2)) : F(0);
     const S offset = domain_.shearOffset(time_) * perLength;
-    const Key key{edges[0], edges[1], isPlane() ? S(0) : edges[2], depth, offset};
-    if (order_ == plan.order && key == key_ && kind_ == domain_.kind()) {
-      return;
-    }
-    key_ = key;
-    kind_ = domain_.kind();
-    order_ = plan.order;
     a_ = Vector3<S>(edges[0], -offset, S(0));
     b_ = Vector3<S>(S(0), edges[1], S(0));
     c_ = Vector3<S>(S(0), S(0), edges[2]);
+    const S plane_sq = edges[0] * edges[0] + edges[1] * edges[1];
+    bool isDeep = false;
+    F span(0);
+    S height(1);
+    if (isPlane()) {
+      using std::sqrt;
+      if (edges[1] > S(4) * edges[0]) {
+        shorten(a_, b_);
+      }
+      const S most = S(plan.flat) * S(Vicinity::beyondMiddle(a_, b_));
+      isDeep = plane_sq + depth * depth > most * most;
+      span = F(depth);
+      height = isDeep ? S(S(slabHeight) * S(sqrt(plane_sq))) : height;
+      depth = isDeep ? std::min<S>(depth, height) : depth;
+      low_ = F(low * perLength);
+      if (isDeep) {
+        shorten(a_, b_);
+        low_ -= F(height - depth) / F(2);  // of a single slab bodies are about the centre
+      }
+    }
+    const Key key{edges[0], edges[1], isPlane() ? S(0) : edges[2], depth, offset};
+    if (order_ == plan.order && key == key_ && kind_ == domain_.kind() && isDeep_ == isDeep) {
+      tabulate(span);
+      return;
+    }
+    isDeep_ = isDeep;
+    perUnit_ = F(1) / F(height);
+    key_ = key;
+    kind_ = domain_.kind();
+    order_ = plan.order;
+    planReach_ = plan.reach;
     reach_sq_ = (edges[0] * edges[0] + edges[1] * edges[1] + depth * depth) * S(plan.reach * plan.reach);
     find();
+    above_.clear();
+    tabulate(span);
   }
 
   /// Of near images, in the unit of `prepare`: first that of the box itself, then s, -s, s', -s' ...
   const std::vector<Vector3<S>>& shifts() const { return shifts_; }
 
-  /// Of all others; see LatticeSums.
-  const std::vector<F>& derivatives() const { return derivatives_; }
   int order() const { return order_; }
   /// (2 pi / 3 V), the background's share of a pair; 0 where there is none.
   const F& background() const { return background_; }
-  /// z around which bodies lie.
-  const F& centre() const { return centre_; }
+  /// The potential of a unit mass's own far images.
+  F ownPotential() const { return F(derivatives_[0] * perUnit_); }
+
+  /// Expansions are in a unit of their own: its inverse, in that of `prepare`. 1 but for slabs, which are
+  /// one high, so that powers of a distance stay in range however deep the patch.
+  const F& perUnit() const { return perUnit_; }
+
+  /// Whether a patch is cut into slabs: where it has a diagonal of more than `flat` times the distance of the
+  /// nearest point that LatticeSums::plane begins with. Sums over nearer ones cancel as powers of that ratio.
+  bool isDeep() const { return isDeep_; }
+
+  /// The slab of a body at z: a whole number; 0 where all are in one.
+  F slabOf(const F& z) const { return isDeep_ ? wholePart(F((z - low_) * perUnit_)) : F(0); }
+
+  /// z above the centre of its slab, in the unit of expansions.
+  F fromCentre(const F& slab, const F& z) const {
+    if (!isDeep_) {
+      return z - centre_;
+    }
+    // Of slabs too far off to be told apart in F, bodies count as at the nearer face.
+    return std::clamp<F>(F((z - low_) * perUnit_ - slab - F(0.5)), F(-0.5), F(0.5));
+  }
+
+  /// Adds to the local expansion of a slab, up to `most` orders, what far images of bodies of given moments
+  /// do that are `below` slabs below it.
+  void addFar(const F& below, const std::vector<F>& moments, std::vector<F>& local, int most) const {
+    const F distance = below < F(0) ? F(-below) : below;
+    const int order = std::min(most, orderAt(distance));
+    const auto contract = [&](const std::vector<F>& derivatives) {
+      X::contract(order, 0, order, moments.data(), derivatives.data(), local.data());
+    };
+    if (below == F(0)) {
+      contract(derivatives_);
+      return;
+    }
+    std::size_t n = 0;
+    while (n < above_.size() && F(static_cast<double>(n + 1)) < distance) {
+      ++n;
+    }
+    std::vector<F> derivatives = n < above_.size() ? above_[n] : derivativesAbove(distance, order);
+    for (int k = 1; below < F(0) && k <= order; k += 2) {  // as the lattice is its own mirror image
+      for (int i = X::D::start(k); i < X::D::start(k + 1); ++i) {
+        F& d = derivatives[static_cast<std::size_t>(i)];
+        d = -d;
+      }
+    }
+    contract(derivatives);
+  }
 
  private:
   using Sums = LatticeSums<F>;
+  using Vicinity = LatticeSums<S>;
+  using X = Expansion<HarmonicTerms>;
   using Point = typename Sums::Point;
   using Key = std::array<S, 5>;
-
-  static const ImagePlan& planFor(const S& tolerance) {
-    for (const ImagePlan& plan : imagePlans) {
-      if (tolerance >= S(plan.tolerance)) {
-        return plan;
-      }
-    }
-    return imagePlans.back();
-  }
 
   Vector3<S> shift(const Point& p) const { return Vector3<S>(S(p[0]) * a_ + S(p[1]) * b_ + S(p[2]) * c_); }
   bool isNear(const Point& p) const { return shift(p).squaredNorm() < reach_sq_; }
 
+  /// Distances in slabs whose derivatives are kept: those of many orders.
+  static constexpr int mostTables = 64;
+
+  void tabulate(const F& span) {
+    const F last = isDeep_ ? wholePart(F(span * perUnit_)) : F(0);
+    for (int n = static_cast<int>(above_.size()) + 1; n <= mostTables && F(n) <= last; ++n) {
+      above_.push_back(derivativesAbove(F(n), orderAt(F(n))));
+    }
+  }
+
+  /// Of the expansion of slabs so far apart. It converges as that of bodies in one slab, which are apart by a
+  /// diagonal d at most and from the nearest far image by reach d: with h the height and n that distance,
+  ///     (reach^2 + (n h/d)^2)^(1/2 order(n)) = reach^order,  and two orders more as there are odd ones.
+  int orderAt(const F& slabs) const {
+    const double part = slabHeight * slabHeight / (1 + slabHeight * slabHeight);
+    const F reach_sq = F(planReach_ * planReach_);
+    const F ratio_sq = reach_sq + F(part) * slabs * slabs;
+    F enough(1);
+    for (int n = 0; n < order_; ++n) {
+      enough *= reach_sq;
+    }
+    int order = 2;
+    for (F product(1); product < enough && order < order_; product *= ratio_sq) {
+      ++order;
+    }
+    return std::min(order, order_);
+  }
+
+  std::vector<F> derivativesAbove(const F& slabs, int order) const {
+    const auto wide = [this](const Vector3<S>& v) {
+      return Vector3<F>(Vector3<F>(F(v[0]), F(v[1]), F(v[2])) * perUnit_);
+    };
+    std::vector<Vector3<F>> near;
+    for (const Vector3<S>& s : shifts_) {
+      near.push_back(wide(s));
+    }
+    return Sums::planeAbove(wide(a_), wide(b_), slabs, order, near);
+  }
+
+  /// The greatest whole number up to x >= 0, for a scalar that need not have floor(); 0 below.
+  static F wholePart(const F& x) {
+    if constexpr (std::is_floating_point_v<F>) {
+      return x > F(0) ? std::floor(x) : F(0);
+    } else {
+      F step(1);
+      while (step <= x) {
+        step += step;
+      }
+      F whole(0);
+      for (; step >= F(1); step /= F(2)) {
+        whole += whole + step <= x ? step : F(0);
+      }
+      return whole;
+    }
+  }
+
+  /// Takes for the edges of a cell the shortest that there are (Lagrange 1773), as a long box that leans has
+  /// cells of far shorter ones. Of two edges the sense stays.
+  static void shorten(Vector3<S>& a, Vector3<S>& b) {
+    const auto subtract = [](Vector3<S>& v, const Vector3<S>& from) {
+      bool isShorter = false;
+      for (S twice = S(2) * v.dot(from);
+           from.squaredNorm() < S(0.999999) * (twice < S(0) ? S(-twice) : twice);
+           twice = S(2) * v.dot(from)) {
+        v -= twice < S(0) ? Vector3<S>(-from) : from;
+        isShorter = true;
+      }
+      return isShorter;
+    };
+    while (subtract(a, b) || subtract(b, a)) {
+    }
+  }
+
   void find() {
     Point bound{0, 0, 0};
     const Vector3<S> edges(a_[0], b_[1], c_[2]);
+    const S area = a_[0] * b_[1] - a_[1] * b_[0];
     for (int axis = 0; axis < (isPlane() ? 2 : 3); ++axis) {
       int& n = bound[static_cast<std::size_t>(axis)];
-      while (S(n) * S(n) * edges[axis] * edges[axis] < reach_sq_) {
+      // The distance of its rows of points: A over the other edge in a plane, as the lattice leans.
+      const S other_sq = (axis == 0 ? b_ : a_).squaredNorm();
+      const S row_sq = isPlane() ? S(area * area / other_sq) : S(edges[axis] * edges[axis]);
+      while (S(n) * S(n) * row_sq < reach_sq_) {
         ++n;
       }
     }
-    bound[1] += isPlane() ? bound[0] / 2 + 1 : 0;  // as the lattice leans
     shifts_.assign(1, Vector3<S>::Zero());
     for (int i = 0; i <= bound[0]; ++i) {
       for (int j = i == 0 ? 0 : -bound[1]; j <= bound[1]; ++j) {
@@ -139,7 +265,9 @@ class PeriodicImages {
       }
     }
     const auto near = [this](const Point& p) { return isNear(p); };
-    const auto wide = [](const Vector3<S>& v) { return Vector3<F>(F(v[0]), F(v[1]), F(v[2])); };
+    const auto wide = [this](const Vector3<S>& v) {
+      return Vector3<F>(Vector3<F>(F(v[0]), F(v[1]), F(v[2])) * perUnit_);
+    };
     if (isPlane()) {
       derivatives_ = Sums::plane(wide(a_), wide(b_), order_, bound, near);
       background_ = F(0);
@@ -159,7 +287,12 @@ class PeriodicImages {
   std::vector<Vector3<S>> shifts_{Vector3<S>(Vector3<S>::Zero())};
   std::vector<F> derivatives_;
   F background_ = F(0);
-  F centre_ = F(0);
+  F centre_ = F(0);  ///< z around which bodies lie that are in one slab
+  bool isDeep_ = false;
+  double planReach_ = 0;
+  F low_ = F(0);  ///< z where the lowest slab begins
+  F perUnit_ = F(1);
+  std::vector<std::vector<F>> above_;  ///< derivatives seen from 1, 2, ... slabs above
 };
 
 }  // namespace gravel::detail
