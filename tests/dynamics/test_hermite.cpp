@@ -325,7 +325,7 @@ TEST_CASE("float follows an orbit in metres and seconds") {
 
 // The star takes half of the first step each time, 128 steps a time unit: 1279 in all, where its planets take
 // 162 each. The old header hangs; so does a floor for steps alone that shrink to less than half.
-TEMPLATE_TEST_CASE("A star amid evenly spread planets does not stop the clock", "", float, double, Real80) {
+TEMPLATE_TEST_CASE("Block steps end on a star amid evenly spread planets", "", float, double, Real80) {
   using S = TestType;
   const auto blocks = [](int n, double offset, double far, double boost) {
     std::vector<Body<S>> list(1);
@@ -394,7 +394,7 @@ TEST_CASE(
 
 // The light pair goes round in 1.05, at 5e-8 of the largest acceleration. Seen to fail: a floor of 64 first
 // steps for all.
-TEST_CASE("A light pair far out is resolved beside a heavy one") {
+TEST_CASE("Block steps resolve a light pair far out beside a heavy one") {
   auto list = scenes::keplerPair<double>(0.0, 0.3);
   for (Body<double>& body : list) {
     body.position[0] += 1e6;

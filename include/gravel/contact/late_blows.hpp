@@ -3,6 +3,7 @@
 /// \file
 /// What blows lack until the forces of the end of their step are known.
 
+#include <gravel/contact/contact.hpp>
 #include <gravel/contact/impact.hpp>
 #include <gravel/spatial/domain.hpp>
 
