@@ -347,8 +347,8 @@ TEST_CASE("float is integrated to its own rounding") {
 }
 
 // 62 steps in ten time units, as on a circle, and up to 125 in float, where the boost rounds places to 1e-4.
-// The old header hangs in nearly all of these (here: "no end"), and the floor of the largest acceleration
-// alone does so for the star that moves or is far out.
+// Seen to hang without floors in nearly all of these (here: "no end"), and by the floor of the largest
+// acceleration alone for the star that moves or is far out.
 TEMPLATE_TEST_CASE("A star amid evenly spread planets does not stop the clock", "", float, double, Real80) {
   using S = TestType;
   const Vector3<S> none = Vector3<S>::Zero();
@@ -372,8 +372,8 @@ TEMPLATE_TEST_CASE("A star amid evenly spread planets does not stop the clock", 
 }
 
 // Between two bodies that go round, and that are fixed; in the middle and beside it. A tracer at rest there
-// leaves it as exp(2.6 t): steps are short while its acceleration is no more than 1e4 of its rounding. The
-// old header hangs beside the middle of the two that go round ("no end").
+// leaves it as exp(2.6 t): steps are short while its acceleration is no more than 1e4 of its rounding. Seen
+// to hang without floors beside the middle of the two that go round ("no end").
 TEMPLATE_TEST_CASE("A tracer in the middle of two bodies does not stop the clock", "", float, double) {
   using S = TestType;
   for (const bool fixed : {false, true}) {
@@ -415,7 +415,7 @@ TEMPLATE_TEST_CASE("A light pair far out is resolved beside a heavy one", "", fl
   CHECK_THAT(static_cast<double>(apart / r), WithinAbs(1.0, small ? 2e-2 : 1e-6));
 }
 
-// Seen to fail: the old header does not return.
+// Seen to fail: without the count it does not return.
 TEST_CASE("Forces without end to their changes are refused") {
   Bodies<double> bodies;
   bodies.add(Body<double>{});

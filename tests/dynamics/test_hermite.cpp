@@ -324,7 +324,7 @@ TEST_CASE("float follows an orbit in metres and seconds") {
 }
 
 // The star takes half of the first step each time, 128 steps a time unit: 1279 in all, where its planets take
-// 162 each. The old header hangs; so does a floor for steps alone that shrink to less than half.
+// 162 each. Seen to hang without the floor; so does a floor for steps alone that shrink to less than half.
 TEMPLATE_TEST_CASE("Block steps end on a star amid evenly spread planets", "", float, double, Real80) {
   using S = TestType;
   const auto blocks = [](int n, double offset, double far, double boost) {
@@ -359,7 +359,7 @@ TEMPLATE_TEST_CASE("Block steps end on a star amid evenly spread planets", "", f
   }
 }
 
-// The old header hangs for the tracer at 1e-16 of the circular pair.
+// Seen to hang without the floor for the tracer at 1e-16 of the circular pair.
 TEST_CASE(
     "A tracer in the middle of two bodies and the centre of a symmetric cluster do not stop the clock") {
   for (const bool fixed : {false, true}) {
