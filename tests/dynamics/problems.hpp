@@ -1,10 +1,11 @@
 #pragma once
 
-/// Two problems with known answers, for one body under an integrator: an orbit and an oscillator.
+/// Problems for integrators: an orbit and an oscillator of one body, with known answers; a star amid planets.
 
 #include <gravel/dynamics/integrator.hpp>
 
 #include <cmath>
+#include <vector>
 
 namespace gravel::test {
 
@@ -29,6 +30,32 @@ Bodies<S, Layout> orbiter(S e) {
 template <Real S>
 S orbitalEnergy(const Body<S>& b) {
   return b.velocity.squaredNorm() / S(2) - S(1) / b.position.norm();
+}
+
+template <class S>
+Bodies<S> bodiesOf(const std::vector<Body<S>>& list) {
+  Bodies<S> bodies;
+  for (const Body<S>& body : list) {
+    bodies.add(body);
+  }
+  return bodies;
+}
+
+/// A star of mass 1 at `place` + (offset, 0, 0) and n planets of 1e-3 evenly on a circle of 1 about `place`,
+/// all with the velocity `boost`.
+template <class S>
+Bodies<S> starOf(int n, double offset, const Vector3<S>& place, const Vector3<S>& boost) {
+  std::vector<Body<S>> list(1);
+  list[0].mass = 1;
+  list[0].position = place + Vector3<S>(S(offset), 0, 0);
+  list[0].velocity = boost;
+  for (int i = 0; i < n; ++i) {
+    const S angle = S(0.1) + S(2 * i) * pi<S>() / S(n);
+    const Vector3<S> out(std::cos(angle), std::sin(angle), 0);
+    list.push_back(
+        {.position = place + out, .velocity = boost + Vector3<S>(-out[1], out[0], 0), .mass = S(1e-3)});
+  }
+  return bodiesOf(list);
 }
 
 struct KeplerForce {

@@ -68,15 +68,6 @@ struct Limited {
   }
 };
 
-template <class S>
-Bodies<S> bodiesOf(const std::vector<Body<S>>& list) {
-  Bodies<S> bodies;
-  for (const Body<S>& body : list) {
-    bodies.add(body);
-  }
-  return bodies;
-}
-
 /// Advances by h [s]. \return the number of steps, those taken again counted
 template <class S>
 std::size_t stepsOf(Bodies<S>& bodies, const S& h) {
@@ -85,23 +76,6 @@ std::size_t stepsOf(Bodies<S>& bodies, const S& h) {
   GaussRadau15<S> method;
   method.advance(bodies, h, false, forces);
   return method.stepsTaken() + method.stepsRejected();
-}
-
-/// A star of mass 1 at `place` + (offset, 0, 0) and n planets of 1e-3 evenly on a circle of 1 about `place`,
-/// all with the velocity `boost`.
-template <class S>
-Bodies<S> starOf(int n, double offset, const Vector3<S>& place, const Vector3<S>& boost) {
-  std::vector<Body<S>> list(1);
-  list[0].mass = 1;
-  list[0].position = place + Vector3<S>(S(offset), 0, 0);
-  list[0].velocity = boost;
-  for (int i = 0; i < n; ++i) {
-    const S angle = S(0.1) + S(2 * i) * pi<S>() / S(n);
-    const Vector3<S> out(std::cos(angle), std::sin(angle), 0);
-    list.push_back(
-        {.position = place + out, .velocity = boost + Vector3<S>(-out[1], out[0], 0), .mass = S(1e-3)});
-  }
-  return bodiesOf(list);
 }
 
 Real80 energyOf(const Bodies<double>& bodies, Real80 G) {

@@ -15,15 +15,6 @@ namespace {
 using Real80 = long double;
 
 template <class S>
-Bodies<S> bodiesOf(const std::vector<Body<S>>& list) {
-  Bodies<S> bodies;
-  for (const Body<S>& body : list) {
-    bodies.add(body);
-  }
-  return bodies;
-}
-
-template <class S>
 Real80 energyOf(const Bodies<S>& bodies, Real80 softening = 0) {
   Real80 energy = 0;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -328,18 +319,7 @@ TEST_CASE("float follows an orbit in metres and seconds") {
 TEMPLATE_TEST_CASE("Block steps end on a star amid evenly spread planets", "", float, double, Real80) {
   using S = TestType;
   const auto blocks = [](int n, double offset, double far, double boost) {
-    std::vector<Body<S>> list(1);
-    list[0].mass = 1;
-    list[0].position = {S(far + offset), 0, 0};
-    list[0].velocity = {S(boost), S(boost / 3), 0};
-    for (int i = 0; i < n; ++i) {
-      const S angle = S(0.1) + S(2 * i) * pi<S>() / S(n);
-      const Vector3<S> out(std::cos(angle), std::sin(angle), 0);
-      list.push_back({.position = out + Vector3<S>(S(far), 0, 0),
-                      .velocity = list[0].velocity + Vector3<S>(-out[1], out[0], 0),
-                      .mass = S(1e-3)});
-    }
-    Run<S> run{bodiesOf(list)};
+    Run<S> run{starOf<S>(n, offset, {S(far), 0, 0}, {S(boost), S(boost / 3), 0})};
     run.advance(S(1) / S(16), 160);
     const S apart = (run.bodies[1].position() - run.bodies[0].position()).norm();
     CHECK_THAT(static_cast<double>(apart), WithinAbs(1.0, 3e-3));

@@ -28,28 +28,6 @@ struct WalkCount {
   }
 };
 
-/// A lower bound (G = 1) of the mean potential of a body by mass: what two children of a cell have of each
-/// other they have at distances of at most its diameter, and so have the bodies of a leaf.
-template <class S, class F>
-F leastMeanPotential(const BodyTree<S, F>& tree, const F& softening_sq) {
-  using std::sqrt;
-  F sum(0);
-  for (const TreeCell<F>& cell : tree.cells) {
-    F squares(0);
-    for (std::uint32_t row = cell.first; cell.isLeaf() && row < cell.last; ++row) {
-      squares += F(tree.m[row]) * F(tree.m[row]);
-    }
-    for (std::uint32_t child = cell.child; child < cell.child + cell.children; ++child) {
-      squares += tree.cells[child].mass * tree.cells[child].mass;
-    }
-    const F widest = F(sqrt(F(F(4) * F(cell.radius) * F(cell.radius) + softening_sq)));
-    if (widest > F(0)) {
-      sum += (cell.mass * cell.mass - squares) / widest;
-    }
-  }
-  return tree.cells[0].mass > F(0) ? F(sum / tree.cells[0].mass) : F(0);
-}
-
 /// Descends through the cells as sinks, depth first. A cell meets the sources that were too near for its
 /// parent: it takes the expansion of those far away, sums those of few bodies one by one, opens those that
 /// are larger than itself, and leaves the rest to its children. Each direction of a pair of cells is decided
