@@ -39,9 +39,11 @@ inline S nearestInteger(const S& x) {
 
 /// A periodic box is [-L/2, L/2) in each axis. In the shear-periodic box x points outward, y along the orbit;
 /// the unperturbed flow is v_y = -(3/2) Omega x, so the image one box further out in x lags by the sheared
-/// offset (3/2) Omega Lx t in y and by (3/2) Omega Lx in v_y (Wisdom & Tremaine 1988, AJ 95, 925).
-/// Bodies must be smaller than half a box, and go less than half of it in a step: of each pair only the image
-/// that is nearest where a step begins is looked at.
+/// offset (3/2) Omega Lx t in y and by (3/2) Omega Lx in v_y (Wisdom & Tremaine 1988, AJ 95, 925). In z it is
+/// a box as well: what leaves at the top comes in at the bottom, in the first step where it was put outside.
+/// Only gravity and the vertical field know no images in z, so let the box be higher than bodies get. Bodies
+/// must be smaller than half a box, and go less than half of it in a step: of each pair only the image that
+/// is nearest where a step begins is looked at.
 template <Real S>
 class Domain {
  public:
