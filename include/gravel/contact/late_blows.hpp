@@ -48,6 +48,10 @@ class LateBlows {
   S makeUp(B& bodies, const Domain<S>& domain, const S& time, const S& h, ImpulseOf&& impulseOf) {
     S loss(0);
     for (const Blow& blow : blows_) {
+      const S du = (blow.pull - pull(bodies, blow)) * (blow.time - h / S(2)) / S(2);
+      if (du == S(0)) {
+        continue;
+      }
       const bool boundary = blow.second == staticPartner;
       Vector3<S> n = blow.normal;
       if (!boundary) {
@@ -55,12 +59,11 @@ class LateBlows {
             Vector3<S>(Vector3<S>(bodies.positions()[blow.second]) - bodies.positions()[blow.first]), time);
         n = detail::safeUnit(n);
       }
-      const S du = (blow.pull - pull(bodies, blow)) * (blow.time - h / S(2)) / S(2);
       const MassShares<S> share =
           massShares<S>(S(bodies.masses()[blow.first]), detail::isMovable(bodies, blow.first),
                         boundary ? S(0) : S(bodies.masses()[blow.second]),
                         !boundary && detail::isMovable(bodies, blow.second));
-      if (du == S(0) || !(S(2) * n.dot(blow.normal) > S(1)) || !(share.effective > S(0))) {
+      if (!(S(2) * n.dot(blow.normal) > S(1)) || !(share.effective > S(0))) {
         continue;
       }
       S& jn = impulseOf(blow.place).normal;
