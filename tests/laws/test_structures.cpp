@@ -87,3 +87,77 @@ TEST_CASE("It is static friction that holds a structure, however little it has o
     }
   }
 }
+
+namespace {
+
+/// Rows of n, n - 1, ... 1 balls in touch, each row in the hollows of the one below.
+std::vector<Vec> triangle(int n) {
+  std::vector<Vec> centres;
+  for (int row = 0; row < n; ++row) {
+    for (int i = 0; i < n - row; ++i) {
+      centres.emplace_back((2 * i + row) * radius, 0.0, (1 + row * std::sqrt(3.0)) * radius);
+    }
+  }
+  return centres;
+}
+
+/// How far any of these balls has moved, over the radius, after so many steps and after as many again.
+/// \param slide kinetic friction over static friction
+std::array<double, 2> moves(const std::vector<Vec>& centres, double dt, double slide, double amongBalls,
+                            double atFloor, bool asked, std::size_t steps) {
+  SimulationConfig<double> config = plain(dt);
+  config.coeffRestitution = 0;
+  config.coeffStaticFriction = amongBalls;
+  config.coeffFriction = slide * amongBalls;
+  if (asked) {
+    config.contactTolerance = 1e-9;
+    config.contactIterations = 3000;
+  }
+  Space<double> space(config);
+  space.setUniformField({0, 0, -g});
+  const double ofFloor = atFloor * atFloor / amongBalls;  // the coefficient of a pair is the geometric mean
+  space.addPlane(
+      {0, 0, 1}, 0,
+      space.addMaterial({.restitution = 0, .staticFriction = ofFloor, .kineticFriction = slide * ofFloor}));
+  for (const Vec& centre : centres) {
+    space.addBody(ball(centre, {0, 0, 0}, radius, 1.0));
+  }
+  std::array<double, 2> most{};
+  std::vector<Vec> from = centres;
+  for (double& move : most) {
+    for (std::size_t k = 0; k < steps; ++k) {
+      space.computeDynamics(k);
+    }
+    for (std::size_t i = 0; i < centres.size(); ++i) {
+      const Vec at = space.body(i).position();
+      move = std::max(move, (at - from[i]).norm() / radius);
+      from[i] = at;
+    }
+  }
+  return most;
+}
+
+}  // namespace
+
+// The friction that 10 and 15 balls need at the floor, by bisection with sweeps to 1e-9: 0.0561. With 20
+// sweeps a solve they needed 0.072 and 0.080: what forces had not reached yet slid, and went on.
+TEST_CASE(
+    "A triangle of balls stands by the default settings on the friction that it needs when all is asked") {
+  for (const int n : {4, 5}) {
+    CAPTURE(n);
+    CHECK(moves(triangle(n), 1.0 / 240, 0.7, 1, 0.054, true, 120)[0] > 3e-3);
+    CHECK(moves(triangle(n), 1.0 / 240, 0.7, 1, 0.054, false, 120)[0] > 3e-3);
+    CHECK(moves(triangle(n), 1.0 / 240, 0.7, 1, 0.059, true, 120)[0] < 3e-3);
+    CHECK(moves(triangle(n), 1.0 / 240, 0.7, 1, 0.059, false, 120)[0] < 3e-3);
+  }
+}
+
+// Seen to fail: what is content to the tolerance is left as it is (1e-3 of a radius in ten minutes, for ever
+// on).
+TEST_CASE("Four balls in a tetrahedron do not creep by the default settings") {
+  const std::vector<Vec> centres = {{0, 0, radius},
+                                    {2 * radius, 0, radius},
+                                    {radius, std::sqrt(3.0) * radius, radius},
+                                    {radius, radius / std::sqrt(3.0), (1 + std::sqrt(8.0 / 3)) * radius}};
+  CHECK(moves(centres, 1.0 / 60, 1, 0.5, 0.5, false, 18'000)[1] < 1e-4);
+}

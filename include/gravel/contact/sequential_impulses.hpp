@@ -61,7 +61,9 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     const S rounding = S(8) * Eigen::NumTraits<S>::epsilon();
     const S enough = std::max<S>(settings.tolerance, rounding) * problem.largestApproach;
     const std::size_t count = problem.rows.size() - colouring.loneCount();
-    if (problem.again && problem.turning.empty() && !(problem.wrong_sq > enough * enough)) {
+    // What is only just content would never become better, and a heap at rest creep by it.
+    const S right = enough / S(16);
+    if (problem.again && problem.turning.empty() && !(problem.wrong_sq > right * right)) {
       report.iterations = 1;  // one that would change nothing
       report.looks += problem.looks;
       problem.kept = problem.passes;

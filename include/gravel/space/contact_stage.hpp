@@ -128,8 +128,8 @@ class ContactStage {
     settings.restitutionThreshold = std::max(config.restitutionThreshold, config.epsilon);
     settings.tolerance = config.contactTolerance;
     settings.gapStep = gapStep_;
-    settings.maxIterations =
-        static_cast<int>(std::min<std::size_t>(config.contactIterations, std::numeric_limits<int>::max()));
+    const std::size_t most = std::min<std::size_t>(config.contactIterations, std::numeric_limits<int>::max());
+    settings.maxIterations = most > 0 ? static_cast<int>(most) : mostSweeps(contacts_.size());
     solver_.setSettings(settings);
     solver_.rebind(contacts_);  // the space may be a copy
     const HillFrame<Scalar> frame(domain);
