@@ -145,8 +145,8 @@ TEST_CASE(
     "A triangle of balls stands by the default settings on the friction that it needs when all is asked") {
   for (const int n : {4, 5}) {
     CAPTURE(n);
-    CHECK(moves(triangle(n), 1.0 / 240, 0.7, 1, 0.054, true, 120)[0] > 3e-3);
-    CHECK(moves(triangle(n), 1.0 / 240, 0.7, 1, 0.054, false, 120)[0] > 3e-3);
+    CHECK(moves(triangle(n), 1.0 / 240, 0.7, 1, 0.052, true, 120)[0] > 3e-3);
+    CHECK(moves(triangle(n), 1.0 / 240, 0.7, 1, 0.052, false, 120)[0] > 3e-3);
     CHECK(moves(triangle(n), 1.0 / 240, 0.7, 1, 0.059, true, 120)[0] < 3e-3);
     CHECK(moves(triangle(n), 1.0 / 240, 0.7, 1, 0.059, false, 120)[0] < 3e-3);
   }

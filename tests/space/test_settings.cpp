@@ -145,7 +145,7 @@ TEST_CASE("The most contact sweeps can be set between steps, or be left to the n
   CHECK(space.config().contactIterations == 7);
   CHECK(sweeps() <= 14);
   CHECK(mostSweeps(0) == 1000);
-  CHECK(mostSweeps(100) == 200);
+  CHECK(mostSweeps(100) == 40);
   CHECK(mostSweeps(1'000'000) == 20);
 }
 
