@@ -390,14 +390,39 @@ TEST_CASE("Block steps resolve a light pair far out beside a heavy one") {
   CHECK_THAT((run.bodies[2].position() - run.bodies[3].position()).norm() / r, WithinAbs(1.0, 1e-3));
 }
 
-// Where steps become shorter, pairs are asked for their rate: 3 % of the steps here. Seen to fail: asked for
-// at every step that does not double.
-TEST_CASE("The floor of steps costs a cluster next to nothing") {
+// The pair is a tenth or a thirtieth of its Hill radius wide. The pull of the star alone asks for steps of a
+// tenth of a time unit, in which the pair turns once and more. Seen to fail by Aarseth's rule alone, off by
+// 0.2 to 3600 for the lighter ones, and with pairs asked where steps become shorter alone. What is left is
+// the tide, 1e-3, and the method's error.
+TEST_CASE("Block steps resolve a light pair beside a star, whose pull hides it") {
+  for (const double m : {1e-9, 1e-12, 1e-15, 1e-18}) {
+    for (const double wide : {0.1, 1.0 / 30}) {
+      for (const double e : {0.0, 0.6}) {
+        const double a = wide * std::cbrt(2 * m / 3);
+        const double apart = a * (1 + e);
+        const double speed = std::sqrt(2 * m / a * (1 - e) / (1 + e));
+        Run<double> run{bodiesOf<double>(
+            {{.mass = 1, .fixed = true},
+             {.position = {1 + apart / 2, 0, 0}, .velocity = {0, 1 + speed / 2, 0}, .mass = m},
+             {.position = {1 - apart / 2, 0, 0}, .velocity = {0, 1 - speed / 2, 0}, .mass = m}})};
+        run.advance(pi<double>() / 2 * std::sqrt(a * a * a / (2 * m)), 80);
+        const Vector3<double> x = run.bodies[1].position() - run.bodies[2].position();
+        const Vector3<double> v = run.bodies[1].velocity() - run.bodies[2].velocity();
+        CAPTURE(m, wide, e);
+        CHECK_THAT((m / x.norm() - v.squaredNorm() / 4) * 2 * a / m, WithinAbs(1.0, 5e-3));
+      }
+    }
+  }
+}
+
+// Where steps become shorter or longer, pairs are asked for their rate: 13 % of the steps here. Seen to fail:
+// asked for at every step that does not double.
+TEST_CASE("The bounds of steps by pairs cost a cluster little") {
   Run<double> run{bodiesOf(scenes::plummerSphere<double>(100))};
   run.advance(0.125, 8);
   const std::uint64_t steps = run.method.bodySteps();
   const std::uint64_t rows = run.forces.pairs() / 100 - 200;  // two evaluations of all to begin with
   CAPTURE(steps, rows);
   CHECK(rows >= steps);
-  CHECK(static_cast<double>(rows - steps) < 0.06 * static_cast<double>(steps));
+  CHECK(static_cast<double>(rows - steps) < 0.2 * static_cast<double>(steps));
 }

@@ -22,7 +22,9 @@ namespace gravel {
 /// Where pulls cancel, as on a star amid evenly spread planets, a is their rounding, and its differences over
 /// a shorter step seem to change faster, without end. But pulls change no faster than the fastest pair: a
 /// step that is to become shorter is no shorter than sqrt(eta)/8 over the rate of that, half of a first step.
-/// At the end of h all bodies are at the same time.
+/// And a steady pull from afar hides the small ones beside it, as that of a star on two asteroids that go
+/// round each other: a step that is doubled, or four times what snap and crackle alone ask for, is no longer
+/// than 3/2 sqrt(eta) over that rate. At the end of h all bodies are at the same time.
 ///
 /// The forces are an object, as JerkSum is, with
 /// - begin(x, m, sources): columns of places [m] and masses [kg], whose first `sources` rows have mass;
@@ -272,21 +274,25 @@ class Hermite4 {
     const Scalar slow = product(d_sq[0], d_sq[2]) + d_sq[1];
     const Scalar fast = product(d_sq[1], d_sq[3]) + d_sq[2];
     const Scalar twice = Scalar(2) * dt;
+    const bool mayDouble = level > 0 && (next & (ticks(Level(level - 1)) - 1)) == 0;
     // A step cut far below what was wanted is too short for differences of third order: it says nothing new.
     if (!(dt * Scalar(64) < s_.wanted[row])) {
       s_.wanted[row] = fast * Scalar(4) < eta_ * slow || !(fast > Scalar(0))
                            ? twice
                            : Scalar(dt * sqrt(Scalar(eta_ * slow / fast)));
-      // Shorter: an encounter, or an acceleration that is rounding. Pairs tell.
-      if (s_.wanted[row] < dt) {
+      // An encounter, an acceleration that is rounding, or a steady pull that hides what changes fast, from
+      // all differences or from those of lower order: pairs tell.
+      const bool hidden = Scalar(16) * eta_ * d_sq[2] * dt * dt < s_.wanted[row] * s_.wanted[row] * d_sq[3];
+      if (s_.wanted[row] < dt || hidden || (mayDouble && !(s_.wanted[row] < twice))) {
         rate_sq_.resize(s_.m.size());
         forces.rates(std::span<const std::uint32_t>(&row, 1), xp_, vp_, rate_sq_);
-        const Scalar floor = stepOfPair(Scalar(rate_sq_[row]), twice) / Scalar(2);
-        s_.wanted[row] = std::max<Scalar>(s_.wanted[row], std::min<Scalar>(twice, floor));
+        const Scalar pair = stepOfPair(Scalar(rate_sq_[row]), twice);
+        const Scalar least = std::min<Scalar>(twice, pair / Scalar(2));
+        s_.wanted[row] = std::max<Scalar>(least, std::min<Scalar>(s_.wanted[row], Scalar(6) * pair));
       }
     }
     Level after = levelFor(s_.wanted[row], h, level);
-    if (level > 0 && !(s_.wanted[row] < twice) && (next & (ticks(Level(level - 1)) - 1)) == 0) {
+    if (mayDouble && !(s_.wanted[row] < twice)) {
       after = Level(level - 1);
     }
     --inLevel_[level];
