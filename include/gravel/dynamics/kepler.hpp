@@ -82,7 +82,7 @@ void keplerIncrements(const Vector3<Scalar>& x, const Vector3<Scalar>& v, const 
     low = h > Scalar(0) ? Scalar(0) : Scalar(-turn);
     high = low + turn;
     s = h * beta / GM;
-    if (r0 * beta > GM / Scalar(2) && h * h < r0 * r0 * r0 / GM) {
+    if (r0 * beta > GM / Scalar(2) && h / r0 * h < r0 / GM * r0) {
       s = h / r0;
     }
   } else {

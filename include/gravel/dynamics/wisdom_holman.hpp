@@ -134,8 +134,8 @@ class WisdomHolman {
     using std::sqrt;
     toJacobi(bodies.accelerations(), dv_);
     for (std::size_t k = 1; k < order_.size(); ++k) {
-      const Scalar r_sq = x_[k].squaredNorm();
-      dv_[k] += x_[k] * Scalar(G * mass_[k] / (r_sq * Scalar(sqrt(r_sq))));
+      const Scalar r_sq = x_[k].squaredNorm();  // its cube may leave the range of float
+      dv_[k] += x_[k] * Scalar(G * mass_[k] / r_sq / Scalar(sqrt(r_sq)));
     }
     for (Vector3<Scalar>& d : dv_) {
       d *= h;
