@@ -26,7 +26,7 @@ Vector3<S> randomVector(const CounterRandom& random, std::size_t i, double span)
 /// Distance of r from the nearest lattice vector.
 template <class S>
 Wide offLattice(const WideVector& r, const Domain<S>& domain, const S& time) {
-  return shortestLength(r, domain, time, 5);
+  return shortestLength(r, domain, time, 8);
 }
 
 }  // namespace
@@ -46,6 +46,34 @@ TEMPLATE_TEST_CASE("an image is the shortest of all images, and one of them", ""
       CAPTURE(i, time);
       CHECK(image.norm() <= shortestLength(wide, domain, time, 5) + tolerance);
       CHECK(offLattice(WideVector(image - wide), domain, time) <= tolerance);
+    }
+  }
+}
+
+// Seen to fail with the next image in x on one side alone.
+TEMPLATE_TEST_CASE("in a sheared box long in y the shortest image may be several boxes out in x", "", float,
+                   double, long double) {
+  using S = TestType;
+  const CounterRandom random(15);
+  const Wide tolerance = 256 * static_cast<Wide>(std::numeric_limits<S>::epsilon());
+  for (const double length : {3.0, 10.0}) {
+    const auto domain = Domain<S>::shearPeriodic({S(1), S(length), S(1)}, S(1));
+    for (std::size_t i = 0; i < 300; ++i) {
+      const S time = S(random.uniform(7000 + i, 0.0, 5.0));
+      Vector3<S> r = randomVector<S>(random, i, 1.0);
+      r[1] *= S(length / 2);
+      r[0] *= i % 3 == 0 ? S(0) : S(1);
+      const Vector3<S> image = domain.minimumImage(r, time);
+      CAPTURE(length, i, time);
+      CHECK(image.template cast<Wide>().norm() <=
+            shortestLength(r.template cast<Wide>().eval(), domain, time, 8) + tolerance);
+      CHECK(offLattice((image - r).template cast<Wide>().eval(), domain, time) <= tolerance);
+      CHECK(domain.minimumImage(Vector3<S>(-r), time) == -image);
+      Vector3<S> same = r;
+      Vector3<S> v = Vector3<S>::Zero();
+      domain.minimumImage(same, v, time);
+      CHECK(same == image);
+      CHECK(std::abs(v[1] - std::round(r[0] - image[0]) * domain.shearSpeed()) <= S(tolerance));
     }
   }
 }

@@ -149,19 +149,31 @@ class Domain {
     Vector3<S> best(r[0] - home * lengths_[0], nearest(r[1], 1), nearest(r[2], 2));
     boxes = home;
     if (kind_ == DomainKind::ShearPeriodic) {
-      // The lattice is oblique: where |r| is above half a box, a neighbour in x may be nearer.
-      const S offset = shearOffset(time);
-      best[1] = nearest(S(r[1] + home * offset), 1);
-      const S side = best[0] < S(0) ? S(-1) : S(1);
-      const S x = best[0] - side * lengths_[0];
-      const S y = nearest(S(r[1] + (home + side) * offset), 1);
-      if (x * x + y * y < best[0] * best[0] + best[1] * best[1]) {
-        best[0] = x;
-        best[1] = y;
-        boxes = home + side;
-      }
+      best[1] = nearest(S(r[1] + home * shearOffset(time)), 1);
+      nearerBox(r, home, time, best, boxes);
     }
     return best;
+  }
+
+  /// The sheared lattice is oblique: where |r| is above half a box, a neighbour in x may be nearer, and one
+  /// further out where boxes are long in y.
+  void nearerBox(const Vector3<S>& r, const S& home, const S& time, Vector3<S>& best, S& boxes) const {
+    const S at = best[0];
+    const S near = at < S(0) ? S(-1) : S(1);  // the side to look at first
+    S best_sq = at * at + best[1] * best[1];
+    S out = lengths_[0] - near * at;  // [m] in x of the nearest one k boxes out
+    for (S k(1); out * out < best_sq; k += S(1), out += lengths_[0]) {
+      for (const S side : {S(near * k), S(-near * k)}) {
+        const S x = at - side * lengths_[0];
+        const S y = nearest(S(r[1] + (home + side) * shearOffset(time)), 1);
+        if (x * x + y * y < best_sq) {
+          best_sq = x * x + y * y;
+          best[0] = x;
+          best[1] = y;
+          boxes = home + side;
+        }
+      }
+    }
   }
 
   /// \return boxes taken off

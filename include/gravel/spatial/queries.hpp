@@ -57,12 +57,19 @@ void forEachImage(const Vector3<S>& home, const S& reach, const Domain<S>& domai
   const auto sees = [&](const S& x, int axis) {
     return x >= -L[axis] / S(2) - reach && x <= L[axis] / S(2) + reach;
   };
-  for (int bx = -1; bx <= 1; ++bx) {
+  // Of an oblique lattice whose boxes are long in y, images beyond the neighbours in x may be the nearest.
+  int across = 1;
+  while (domain.kind() == DomainKind::ShearPeriodic && S(across) * L[0] < reach &&
+         S(2 * across) * L[0] < L[0] + L[1]) {
+    ++across;
+  }
+  for (int bx = -across; bx <= across; ++bx) {
     const S x = home[0] + S(bx) * L[0];
     if (!sees(x, 0)) {
       continue;
     }
-    for (int by = -2; by <= 2; ++by) {  // the sheared offset reaches half a box further
+    const int along = 1 + across;  // the sheared offset reaches half a box further
+    for (int by = -along; by <= along; ++by) {
       const S y = home[1] - S(bx) * offset + S(by) * L[1];
       if (!sees(y, 1)) {
         continue;
