@@ -74,7 +74,8 @@ void readBody(TableReader& reader, std::vector<SceneBody>& bodies) {
   Eigen::Vector4d orientation(0, 0, 0, 1);
   reader.numbers<4>("orientation", orientation);
   body.orientation.coeffs() = orientation;
-  reader.real("radius", body.radius, notNegative());
+  const bool hasRadius = reader.has("radius");
+  const bool isPoint = hasRadius == reader.real("radius", body.radius, notNegative()) && body.radius == 0.0;
   double density = 0.0;
   const bool hasMass = reader.has("mass");
   const bool hasDensity = reader.has("density");
@@ -83,6 +84,9 @@ void readBody(TableReader& reader, std::vector<SceneBody>& bodies) {
   if (hasMass == hasDensity) {
     reader.missing(hasMass ? "room for both \"mass\" and \"density\": give one" : "\"mass\" or \"density\"");
   } else if (hasDensity) {
+    if (isPoint) {
+      reader.fault("density", "given", "with a radius > 0; what has none needs a \"mass\"");
+    }
     body.mass = density * 4.0 / 3.0 * pi<double>() * body.radius * body.radius * body.radius;
   }
   double inertia = 0.0;
@@ -281,7 +285,7 @@ void readDomain(TableReader& reader, Domain<double>& domain) {
   static const std::vector<std::string> kinds{"open", "periodic", "shearPeriodic"};
   std::size_t kind = 0;
   Vector3<double> lengths = Vector3<double>::Zero();
-  reader.choice("kind", kinds, kind);
+  const bool understood = reader.choice("kind", kinds, kind) || !reader.has("kind");
   const bool hasLengths = reader.numbers<3>("lengths", lengths, positive());
   double omega = 0.0;
   const bool hasOmega = reader.real("omega", omega);
@@ -293,6 +297,14 @@ void readDomain(TableReader& reader, Domain<double>& domain) {
   if (kind == 2 && !reader.has("omega")) {
     reader.missing("\"omega\", the orbital frequency");
   }
+  const auto belongs = [&](const char* key, bool allowed, const char* where) {
+    if (understood && !allowed && reader.has(key)) {
+      reader.fault(key, "given", where);
+    }
+  };
+  belongs("lengths", kind != 0, "with kind = \"periodic\" or \"shearPeriodic\"");
+  belongs("omega", kind == 2, "with kind = \"shearPeriodic\"");
+  belongs("verticalFrequency", kind == 2, "with kind = \"shearPeriodic\"");
   if (kind == 1 && hasLengths) {
     domain = Domain<double>::periodic(lengths);
   } else if (kind == 2 && hasLengths && hasOmega) {
