@@ -138,7 +138,9 @@ TEST_CASE("No pair meets deeper than a quarter of the smaller radius, and a dist
   CHECK(stepAt(0.5, 20.0) == wide.largest);
 }
 
-TEST_CASE("Steps keep to their limits; points at one place, and none at all, ask for no step of zero") {
+// Seen to fail, at the shortest step for ever, with two points in one place as a pair that is infinitely
+// fast.
+TEST_CASE("Steps keep to their limits; points at one place, and none at all, ask for nothing") {
   const StepLimits<double> limits{0.02, 1e-3, 0.1};
   const auto pair = made(scenes::keplerPair<double>(0.0, 0.3));
   CHECK(stepFromEncounters(pair, 1e-30, 0.0, limits) == 0.1);
@@ -147,7 +149,14 @@ TEST_CASE("Steps keep to their limits; points at one place, and none at all, ask
   CHECK(stepFromEncounters(Bodies<double>(), 1.0, 0.0, limits) == 0.1);
   Body<double> point;
   CHECK(stepFromEncounters(made<double>({point}), 1.0, 0.0, limits) == 0.1);
-  CHECK(stepFromEncounters(made<double>({point, point}), 1.0, 0.0, limits) == 1e-3);
+  CHECK(stepFromEncounters(made<double>({point, point}), 1.0, 0.0, limits) == 0.1);
+  auto withOthers = scenes::keplerPair<double>(0.0, 0.3);
+  const double alone = stepFromEncounters(made<double>(withOthers), 1.0, 0.0, wide);
+  withOthers.push_back(withOthers[1]);
+  withOthers[1].mass /= 2;
+  withOthers[2].mass /= 2;
+  const double halved = stepFromEncounters(made<double>(withOthers), 1.0, 0.0, wide);
+  CHECK_THAT(halved, WithinRel(alone, 0.1));
   point.mass = 0;
   CHECK(stepFromEncounters(made<double>({point, point}), 1.0, 0.0, limits) == 0.1);
 }

@@ -79,7 +79,9 @@ class EncounterTable {
         approach = std::max<S>(approach, b.maxCoeff());
         s = s.max((r_.tail(k) + r_[i]).square());  // nothing gets closer than touching
       }
-      s = (s + softening * softening).max(S(1e-60)).inverse();
+      s += softening * softening;
+      // Two points in one place do not pull each other.
+      s = (s > S(0)).select(s.max(S(1e-60)).inverse(), Column::Constant(k, S(0)));
       a = speed_sq * s * T_sq;
       b = ((m_.tail(k) + m_[i]) * (G * T_sq)).square() * (s * s * s);
       if (free_[i] == S(0)) {

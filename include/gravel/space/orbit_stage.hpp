@@ -83,7 +83,9 @@ class OrbitStage {
     const Scalar wanted = gaussRadau_.nextStep() > Scalar(0)
                               ? gaussRadau_.nextStep()
                               : GaussRadau15<Scalar>::firstStep(bodies, config.timeStep);
-    return std::clamp<Scalar>(wanted, config.minTimeStep, config.timeStep);
+    // Where points fall on each other the step has no least: it would come down to where time stands still.
+    const Scalar least = std::max<Scalar>(config.minTimeStep, config.timeStep * Scalar(1e-12));
+    return std::clamp<Scalar>(wanted, least, config.timeStep);
   }
 
   std::uint64_t individualSteps() const { return hermite_.bodySteps(); }
