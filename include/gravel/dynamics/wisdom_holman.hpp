@@ -29,13 +29,13 @@ class WisdomHolman {
  public:
   /// Advances by h [s]. Accelerations must be those of the present positions, and are at the end.
   /// \param G  as in the forces  \param forces  called once, with h
-  /// \throws std::invalid_argument if no body has mass, or one is fixed; nothing has moved then
+  /// \throws std::invalid_argument if no body has mass, one is fixed, or one stands at the centre of mass of
+  ///   those before it, about which it has no orbit; nothing has moved then
   template <class Layout, class Forces>
   void advance(Bodies<Scalar, Layout>& bodies, const Scalar& G, const Scalar& h, Forces&& forces) {
     prepare(bodies);
     lost_.resize(bodies.size());
     const Scalar half = h / Scalar(2);
-    toJacobi(bodies.positions(), x_);
     kick(bodies, G, half);
     toJacobi(bodies.velocities(), v_);
     for (std::size_t k = 0; k < order_.size(); ++k) {
@@ -78,7 +78,7 @@ class WisdomHolman {
     }
   }
 
-  /// Finds centre and order. Part of advance(), with its errors.
+  /// Finds centre, order and places. Part of advance(), with its errors.
   template <class Layout>
   void prepare(const Bodies<Scalar, Layout>& bodies) {
     check(bodies);
@@ -103,6 +103,15 @@ class WisdomHolman {
       sum += m;
       mass_[k] = sum;
       share_[k] = m / sum;
+    }
+    toJacobi(bodies.positions(), x_);
+    for (std::size_t k = 1; k < n; ++k) {
+      if (x_[k].squaredNorm() == Scalar(0)) {
+        detail::refuse("distance with the integrator WisdomHolman of body " +
+                           std::to_string(toInteger(bodies[order_[k]].id())) +
+                           " from the centre of mass of those before it",
+                       "0", "> 0");
+      }
     }
   }
 
