@@ -208,6 +208,7 @@ TEST_CASE("Sleepers wake where the world changes") {
   SECTION("the domain") { space.setDomain(Domain<double>::periodic({100, 100, 100})); }
   SECTION("a plane that is gone") { space.removePlane(0); }
   SECTION("the surface of all") { space.setCoeffFriction(0.01); }
+  SECTION("the surface of a pair") { space.setPairMaterial(defaultMaterial, defaultMaterial, {}); }
   SECTION("a wish") { space.wakeAll(); }
   advance(space, 1);
   CHECK(sleepers(space) == 0);
@@ -305,6 +306,52 @@ TEST_CASE("A fixed body that is moved, freed or removed wakes what leans on it")
   CHECK_FALSE(space.body(rock).isAsleep());
   advance(space, 60);
   CHECK(space.body(rock).position()[2] < 1.4);
+}
+
+// Seen to fail: only what an island leaned on was looked at, and fixed bodies stood in sleepers for ever.
+TEST_CASE("A fixed body that is put into sleepers wakes them, and is left by them") {
+  Space<double> space(sleepy());
+  space.setUniformField({0, 0, -g});
+  space.addPlane({0, 0, 1}, 0.0);
+  const BodyId rock = space.addBody(ball({0, 0, 0.5}, {0, 0, 0}, 0.5));
+  const BodyId other = space.addBody(ball({-3, 0, 0.5}, {0, 0, 0}, 0.5));
+  Body<double> post = ball({5, 0, 0.5}, {0, 0, 0}, 0.5);
+  post.fixed = true;
+  const BodyId far = space.addBody(post);
+  advance(space, 40);
+  REQUIRE(sleepers(space) == 2);
+  const auto putInto = [&](Space<double>& where) {
+    SECTION("added") {
+      post.position = Vec(0.75, 0, 0.5);
+      where.addBody(post);
+    }
+    SECTION("moved") { where.body(far).position() = Vec(0.75, 0, 0.5); }
+    SECTION("grown") { where.body(far).radius() = 4.75; }
+    SECTION("fixed") {
+      post.position = Vec(0.75, 0, 0.5);
+      post.fixed = false;
+      where.body(where.addBody(post)).setFixed(true);
+    }
+  };
+  SECTION("at once") { putInto(space); }
+  SECTION("before a file") {
+    putInto(space);
+    const TemporaryFile file("fixed_among_sleepers.snapshot");
+    space.save(file.path());
+    space.restore(file.path());
+  }
+  SECTION("after a file") {
+    const TemporaryFile file("fixed_beside_sleepers.snapshot");
+    space.save(file.path());
+    space.restore(file.path());
+    putInto(space);
+  }
+  advance(space, 1);
+  CHECK_FALSE(space.body(rock).isAsleep());
+  CHECK(space.body(other).isAsleep());
+  advance(space, 100);
+  CHECK_THAT(space.body(rock).position()[0], WithinAbs(-0.25, 1e-3));
+  CHECK(sleepers(space) == 2);
 }
 
 // The pile wakes in the step in which the ball arrives, before the blow: the blow is that of bodies that can

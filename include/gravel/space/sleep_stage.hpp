@@ -9,6 +9,7 @@
 /// asleep stands still, keeps the impulses of its contacts, and pulls others as before. It wakes
 ///   when something awake touches it, or comes as near within the next step,
 ///   when what it leans on is moved, removed, or moves,
+///   when a fixed body is put into one of its bodies,
 ///   when somebody changes one of its bodies, or the surfaces,
 ///   when the acceleration of one of its bodies has changed by sleepSpeed/sleepTime, or by a 64th of the
 ///   island's mean, whichever is less.
@@ -56,6 +57,7 @@ class SleepStage {
         island.state = IslandState::Waking;
       }
     }
+    lookForFixed(bodies, contact.domain);
   }
 
   /// Tired islands fall asleep, if nobody gave them speed. \return the energy of motion that they lose [J]
@@ -186,6 +188,7 @@ class SleepStage {
 
   void save(SnapshotWriter& out) const {
     detail::IslandRecord<Scalar> record;
+    record.put(fixed_);
     for (const SleepingIsland<Scalar>& island : islands_) {
       record.put(island);
     }
@@ -198,6 +201,7 @@ class SleepStage {
   /// \throws std::runtime_error if the file does not hold what save() writes
   void load(SnapshotReader& in) {
     detail::IslandReader<Scalar> record(in);
+    fixed_ = record.bodies();
     while (!record.done()) {
       islands_.push_back(record.island());
     }
@@ -291,15 +295,17 @@ class SleepStage {
     }
   }
 
+  void lookForFixed(const Bodies& bodies, const Domain<Scalar>& domain);
   void findTired(const Bodies& bodies, const Contacts& contact, const Config& config, const Scalar& h);
   void putAside(const Bodies& bodies, Contacts& contact);
   void release(Bodies& bodies, const Contacts& contact, const SleepingIsland<Scalar>& island,
                ContactList<Scalar>& contacts, std::vector<StoredImpulse<Scalar>>& memory);
 
   std::vector<SleepingIsland<Scalar>> islands_;
-  std::vector<Scalar> slow_;        ///< [s] by index, how long a body has been slow
-  std::vector<std::uint64_t> ids_;  ///< of these bodies
-  Material<Scalar> surface_{};      ///< of the space, when the last island fell asleep
+  std::vector<RestingBody<Scalar>> fixed_;  ///< bodies that cannot move, while islands_ are there
+  std::vector<Scalar> slow_;                ///< [s] by index, how long a body has been slow
+  std::vector<std::uint64_t> ids_;          ///< of these bodies
+  Material<Scalar> surface_{};              ///< of the space, when the last island fell asleep
   ContactIslands groups_;
   std::vector<std::uint32_t> islandOf_;
   bool numbered_ = false;

@@ -7,6 +7,50 @@
 
 namespace gravel {
 
+/// Marks islands into which a fixed body was put, moved or grown since the last look. O(bodies), and
+/// O(sleepers) for each fixed body that is another one than before.
+template <Real Scalar, class Layout>
+void SleepStage<Scalar, Layout>::lookForFixed(const Bodies& bodies, const Domain<Scalar>& domain) {
+  const auto isFixed = [&](std::size_t i) { return bodies[i].isFixed(); };
+  std::size_t k = 0;
+  bool same = true;
+  for (std::size_t i = 0; same && i < bodies.size(); ++i) {
+    if (isFixed(i)) {
+      same = k < fixed_.size() && fixed_[k].id == bodies.ids()[i] && fixed_[k].holds(bodies[i]);
+      ++k;
+    }
+  }
+  if (same && k == fixed_.size()) {
+    return;
+  }
+  std::map<std::uint64_t, const RestingBody<Scalar>*> before;
+  for (const RestingBody<Scalar>& body : fixed_) {
+    before.emplace(body.id, &body);
+  }
+  std::vector<RestingBody<Scalar>> now;
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    if (!isFixed(i)) {
+      continue;
+    }
+    now.push_back(RestingBody<Scalar>::of(bodies[i]));
+    const auto found = before.find(now.back().id);
+    if (found != before.end() && found->second->holds(bodies[i])) {
+      continue;
+    }
+    for (SleepingIsland<Scalar>& island : islands_) {
+      for (const RestingBody<Scalar>& member : island.members) {
+        // At no time in particular: in a sheared domain nothing sleeps.
+        const Vector3<Scalar> r =
+            domain.minimumImage(Vector3<Scalar>(member.position - now.back().position), Scalar(0));
+        if (detail::safeNorm(r) < member.radius + now.back().radius) {
+          island.state = IslandState::Waking;
+        }
+      }
+    }
+  }
+  fixed_ = std::move(now);
+}
+
 /// Islands all of whose bodies have been slow for long enough, and which what they lean on carries.
 template <Real Scalar, class Layout>
 void SleepStage<Scalar, Layout>::findTired(const Bodies& bodies, const Contacts& contact,
@@ -66,6 +110,10 @@ void SleepStage<Scalar, Layout>::findTired(const Bodies& bodies, const Contacts&
     }
     found[k].fall = weight / mass;
     if (!(detail::safeNorm(net) * Scalar(16) > weight * h)) {
+      if (islands_.empty()) {
+        fixed_.clear();
+        lookForFixed(bodies, contact.domain);
+      }
       islands_.push_back(std::move(found[k]));
       surface_ = contact.materials.pair(defaultMaterial, defaultMaterial, config);
       numbered_ = false;

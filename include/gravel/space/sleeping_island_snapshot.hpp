@@ -25,6 +25,12 @@ struct IslandRecord {
     put(b.angularAcceleration);
     numbers.insert(numbers.end(), {b.mass, b.radius});
   }
+  void put(const std::vector<RestingBody<Scalar>>& bodies) {
+    names.push_back(bodies.size());
+    for (const RestingBody<Scalar>& b : bodies) {
+      put(b);
+    }
+  }
   void put(const ContactImpulse<Scalar>& j) {
     numbers.push_back(j.normal);
     put(j.tangential);
@@ -73,6 +79,14 @@ class IslandReader {
         materials_(in.array<Material<Scalar>>("materials of sleepers")) {}
 
   bool done() const { return name_ == names_.size(); }
+
+  std::vector<RestingBody<Scalar>> bodies() {
+    std::vector<RestingBody<Scalar>> all;
+    for (std::uint64_t count = name(); count > 0; --count) {
+      all.push_back(body());
+    }
+    return all;
+  }
 
   SleepingIsland<Scalar> island() {
     SleepingIsland<Scalar> island;

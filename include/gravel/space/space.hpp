@@ -102,6 +102,7 @@ class Space : public Settings<Scalar> {
   /// \throws std::invalid_argument on coefficients out of range, and for what is no material
   void setPairMaterial(MaterialId a, MaterialId b, const Material<Scalar>& material) {
     contact_.materials.setPair(a, b, material);
+    wakeAll();
   }
   /// One of them alone, and what two are to each other. \throws std::invalid_argument for what is no material
   Material<Scalar> material(MaterialId id) const { return contact_.materials.get(id, this->config_); }
