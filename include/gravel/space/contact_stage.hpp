@@ -82,6 +82,8 @@ class ContactStage {
     std::vector<ContactImpulse<Scalar>> impulses;
   };
   Touches allTouches(const Bodies& bodies) const;
+  /// Adds what ended inside the step, with what it bore until then. A pair may be there twice. O(contacts).
+  void addEnded(const Bodies& bodies, Touches& all) const;
 
   /// Shrinks overlaps by moving bodies, and renews the geometry of the contacts, so that impulses act where
   /// the bodies are.
@@ -208,6 +210,10 @@ class ContactStage {
   template <class Pair>
   static bool renumber(const Bodies& bodies, Pair& pair);
 
+  /// Calls visit(contact, impulse) for what bore something in the first half of the part.
+  template <class Visit>
+  void forEachBefore(Visit&& visit) const;
+
   void bookKick(const Bodies& bodies, const Scalar& kick);
 
   void colour(const Bodies& bodies, Profiler& profiler) {
@@ -287,7 +293,8 @@ class ContactStage {
   mutable std::vector<ContactKeys> struck_;
   bool searched_ = false;  // neighbours_ hold for the whole drift
   ContactList<Scalar> contacts_;
-  std::uint64_t revision_ = 0;  // of the bodies by whose indices contacts and impacts are
+  std::vector<Contact<Scalar>> before_;  // those that contacts_ took the place of
+  std::uint64_t revision_ = 0;           // of the bodies by whose indices contacts and impacts are
   mutable Present present_;
   ContactSolver<Scalar> solver_;
   StepRecord<Scalar> record_;

@@ -50,12 +50,15 @@ void ContactStage<Scalar, Layout>::endPart(const Scalar& start, bool last) {
   if (!last) {
     record_.endPart(impacts_.impacts(), start);
     if (firstActed_) {
-      record_.add(solver_.earlierImpulses(), [&](std::size_t k) { return solver_.earlierKeys(k); });
+      record_.add([&](auto&& visit) { forEachBefore(visit); });
       firstActed_ = false;
     }
     if (acted_ && !contacts_.empty()) {
-      record_.add(solver_.impulses(), [&](std::size_t k) {
-        return ContactKeys{contacts_[k].key1, contacts_[k].key2};
+      record_.add([&](auto&& visit) {
+        const std::span<const ContactImpulse<Scalar>> now = solver_.impulses();
+        for (std::size_t k = 0; k < now.size(); ++k) {
+          visit(contacts_[k], now[k]);
+        }
       });
     }
     impacts_.clear();
@@ -65,15 +68,48 @@ void ContactStage<Scalar, Layout>::endPart(const Scalar& start, bool last) {
 }
 
 template <Real Scalar, class Layout>
+template <class Visit>
+void ContactStage<Scalar, Layout>::forEachBefore(Visit&& visit) const {
+  const std::vector<ContactImpulse<Scalar>> impulses = solver_.earlierImpulses();
+  auto c = before_.begin();
+  for (std::size_t k = 0; k < impulses.size(); ++k) {
+    const ContactKeys keys = solver_.earlierKeys(k);
+    while (c != before_.end() && ContactKeys{c->key1, c->key2} < keys) {
+      ++c;
+    }
+    if (c != before_.end() && ContactKeys{c->key1, c->key2} == keys) {
+      visit(*c, impulses[k]);
+    }
+  }
+}
+
+template <Real Scalar, class Layout>
 std::vector<ContactImpulse<Scalar>> ContactStage<Scalar, Layout>::impulses() const {
   std::vector<ContactImpulse<Scalar>> sum = solver_.copyImpulses();
   sum.resize(contacts_.size());
   record_.addTo(sum, contacts_);
   if (firstActed_) {
-    record_.addTo(sum, contacts_, solver_.earlierImpulses(),
-                  [&](std::size_t k) { return solver_.earlierKeys(k); });
+    StepRecord<Scalar> first;
+    first.add([&](auto&& visit) { forEachBefore(visit); });
+    first.addTo(sum, contacts_);
   }
   return sum;
+}
+
+template <Real Scalar, class Layout>
+void ContactStage<Scalar, Layout>::addEnded(const Bodies& bodies, Touches& all) const {
+  const auto add = [&](Contact<Scalar> c, const ContactImpulse<Scalar>& impulse) {
+    if (renumber(bodies, c)) {
+      all.contacts.push_back(c, {});
+      all.impulses.push_back(impulse);
+    }
+  };
+  record_.forEachEnded(contacts_, add);
+  if (firstActed_) {
+    StepRecord<Scalar> first;
+    first.add([&](auto&& visit) { forEachBefore(visit); });
+    first.forEachEnded(contacts_, add);
+  }
 }
 
 template <Real Scalar, class Layout>

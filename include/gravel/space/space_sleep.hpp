@@ -39,10 +39,11 @@ void Space<Scalar, Layout>::fallAsleep() {
   contact_.setIdle(isIdle());
 }
 
-/// What touches, with what sleeps.
+/// What touches, with what sleeps and what ended inside the step.
 template <Real Scalar, class Layout>
 auto Space<Scalar, Layout>::allTouches() const -> typename ContactStage<Scalar, Layout>::Touches {
   auto touches = contact_.allTouches(bodies_);
+  contact_.addEnded(bodies_, touches);
   sleep_.addTouches(bodies_, touches, previous_dt_);
   return touches;
 }

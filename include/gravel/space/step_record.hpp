@@ -17,53 +17,54 @@ class StepRecord {
  public:
   /// A new step begins.
   void clear() {
-    keys_.clear();
-    sums_.clear();
+    entries_.clear();
     impacts_.clear();
     parts_ = 1;
   }
 
-  /// Adds the impulses of a solve, in the order of their keys, keysOf(k). O(contacts).
-  template <class KeysOf>
-  void add(std::span<const ContactImpulse<Scalar>> impulses, KeysOf&& keysOf) {
-    keysBefore_.swap(keys_);
-    sumsBefore_.swap(sums_);
-    keys_.clear();
-    sums_.clear();
-    std::size_t m = 0;
-    for (std::size_t k = 0; k < impulses.size(); ++k) {
-      const ContactKeys keys = keysOf(k);
-      for (; m < keysBefore_.size() && keysBefore_[m] < keys; ++m) {
-        keys_.push_back(keysBefore_[m]);
-        sums_.push_back(sumsBefore_[m]);
+  /// Adds the impulses of a solve. O(contacts).
+  /// \param forEach  calls visit(contact, impulse) for all of them, in the order of their keys
+  template <class ForEach>
+  void add(ForEach&& forEach) {
+    before_.swap(entries_);
+    entries_.clear();
+    auto old = before_.begin();
+    forEach([&](const Contact<Scalar>& c, const ContactImpulse<Scalar>& impulse) {
+      for (; old != before_.end() && keysBefore(old->contact, c); ++old) {
+        entries_.push_back(*old);
       }
-      keys_.push_back(keys);
-      sums_.push_back(impulses[k]);
-      if (m < keysBefore_.size() && keysBefore_[m] == keys) {
-        join(sums_.back(), sumsBefore_[m++]);
+      entries_.push_back({c, impulse});
+      if (old != before_.end() && !keysBefore(c, old->contact)) {
+        join(entries_.back().sum, (old++)->sum);
       }
-    }
-    keys_.insert(keys_.end(), keysBefore_.begin() + static_cast<std::ptrdiff_t>(m), keysBefore_.end());
-    sums_.insert(sums_.end(), sumsBefore_.begin() + static_cast<std::ptrdiff_t>(m), sumsBefore_.end());
+    });
+    entries_.insert(entries_.end(), old, before_.end());
   }
 
-  /// Adds what is recorded here to the impulses `sum` of contacts. A contact that ended before is not among
-  /// them. O(contacts).
+  /// Adds what is recorded here to the impulses `sum` of contacts, which are in the order of their keys. A
+  /// contact that ended before is not among them. O(contacts).
   void addTo(std::vector<ContactImpulse<Scalar>>& sum, std::span<const Contact<Scalar>> contacts) const {
-    addTo(sum, contacts, sums_, [&](std::size_t k) { return keys_[k]; });
-  }
-  /// The same of one solve.
-  template <class KeysOf>
-  static void addTo(std::vector<ContactImpulse<Scalar>>& sum, std::span<const Contact<Scalar>> contacts,
-                    std::span<const ContactImpulse<Scalar>> impulses, KeysOf&& keysOf) {
-    std::size_t m = 0;
+    auto entry = entries_.begin();
     for (std::size_t k = 0; k < contacts.size(); ++k) {
-      const ContactKeys keys{contacts[k].key1, contacts[k].key2};
-      while (m < impulses.size() && keysOf(m) < keys) {
-        ++m;
+      while (entry != entries_.end() && keysBefore(entry->contact, contacts[k])) {
+        ++entry;
       }
-      if (m < impulses.size() && keysOf(m) == keys) {
-        join(sum[k], impulses[m]);
+      if (entry != entries_.end() && !keysBefore(contacts[k], entry->contact)) {
+        join(sum[k], entry->sum);
+      }
+    }
+  }
+
+  /// Calls visit(contact, impulse) for what is recorded here and is none of these contacts. O(contacts).
+  template <class Visit>
+  void forEachEnded(std::span<const Contact<Scalar>> contacts, Visit&& visit) const {
+    auto c = contacts.begin();
+    for (const Entry& entry : entries_) {
+      while (c != contacts.end() && keysBefore(*c, entry.contact)) {
+        ++c;
+      }
+      if (c == contacts.end() || keysBefore(entry.contact, *c)) {
+        visit(entry.contact, entry.sum);
       }
     }
   }
@@ -95,10 +96,12 @@ class StepRecord {
     sum.turning += part.turning;
   }
 
-  std::vector<ContactKeys> keys_;  ///< sorted
-  std::vector<ContactImpulse<Scalar>> sums_;
-  std::vector<ContactKeys> keysBefore_;
-  std::vector<ContactImpulse<Scalar>> sumsBefore_;
+  struct Entry {
+    Contact<Scalar> contact;  ///< as it was last
+    ContactImpulse<Scalar> sum;
+  };
+  std::vector<Entry> entries_;  ///< in the order of their keys
+  std::vector<Entry> before_;
   std::vector<Impact<Scalar>> impacts_;
   std::size_t parts_ = 1;
 };
