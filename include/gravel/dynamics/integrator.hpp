@@ -4,6 +4,7 @@
 /// The loop of kicks, drifts and force evaluations, for every method that is a row of a table.
 
 #include <gravel/core/parallel.hpp>
+#include <gravel/core/rounded.hpp>
 #include <gravel/dynamics/compensation.hpp>
 #include <gravel/dynamics/integrator_tables.hpp>
 #include <gravel/dynamics/rotation.hpp>
@@ -22,21 +23,24 @@ void kickAndDriftOne(Bodies<Scalar, Layout>& bodies, std::size_t i, const Scalar
   if (body.isHeld()) {
     return;
   }
+  const auto times = [](const auto& rate, const Scalar& time) {
+    return rounded(Vector3<Scalar>(rate * time));
+  };
   if (!(kick == Scalar(0))) {
     if (lost != nullptr) {
-      (*lost)[i].velocity.add(body.velocity(), body.acceleration() * kick);
+      (*lost)[i].velocity.add(body.velocity(), times(body.acceleration(), kick));
     } else {
-      body.velocity() += body.acceleration() * kick;
+      body.velocity() += times(body.acceleration(), kick);
     }
     if (torques) {
-      body.angularVelocity() += body.angularAcceleration() * kick;
+      body.angularVelocity() += times(body.angularAcceleration(), kick);
     }
   }
   if (!(drift == Scalar(0))) {
     if (lost != nullptr) {
-      (*lost)[i].position.add(body.position(), body.velocity() * drift);
+      (*lost)[i].position.add(body.position(), times(body.velocity(), drift));
     } else {
-      body.position() += body.velocity() * drift;
+      body.position() += times(body.velocity(), drift);
     }
     const Vector3<Scalar> spin = body.angularVelocity();
     if (!(spin.squaredNorm() == Scalar(0))) {
@@ -57,7 +61,8 @@ void kickAndDriftTile(Bodies<Scalar, Layout>& bodies, std::size_t i, std::size_t
                         tileOf(storage, field, 2, i)};
     };
     const auto times = [](auto& rates, const Scalar& time) {
-      return std::array<Lane, 3>{rates[0] * time, rates[1] * time, rates[2] * time};
+      return std::array<Lane, 3>{rounded<Lane>(rates[0] * time), rounded<Lane>(rates[1] * time),
+                                 rounded<Lane>(rates[2] * time)};
     };
     const auto add = [&](auto& sums, const std::array<Lane, 3>& terms, std::size_t row) {
       if (lost != nullptr) {
@@ -74,7 +79,7 @@ void kickAndDriftTile(Bodies<Scalar, Layout>& bodies, std::size_t i, std::size_t
       auto a = tiles(fields::Acceleration{});
       add(v, times(a, kick), 3);
       for (std::size_t c = 0; torques && c < 3; ++c) {
-        w[c] += tileOf(storage, fields::AngularAcceleration{}, c, i) * kick;
+        w[c] += rounded<Lane>(tileOf(storage, fields::AngularAcceleration{}, c, i) * kick);
       }
     }
     if (!(drift == Scalar(0))) {
