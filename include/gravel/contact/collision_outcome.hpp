@@ -49,7 +49,8 @@ template <Real Scalar>
 struct CollisionOutcome {
   CollisionKind kind = CollisionKind::Bounce;
   /// With CollisionKind::Velocities: of the two bodies after the blow. Those of a fixed body count nothing.
-  /// Two that still approach each other are stopped by the contact solver.
+  /// Two that still approach each other fly on to the end of the step, where they bounce as the materials
+  /// say.
   Vector3<Scalar> velocity1 = Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(0));
   Vector3<Scalar> velocity2 = Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(0));
   Vector3<Scalar> angularVelocity1 = Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(0));

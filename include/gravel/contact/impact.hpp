@@ -49,7 +49,7 @@ struct Impact {
   ContactImpulse<Scalar> impulse;  ///< on the second
   bool rests;                      ///< it stays in contact for the rest of the step
   Scalar settle;  ///< [s] since the start of the step: when the last of its bounces is over, if it rests
-  bool decided = false;  ///< by somebody else's outcome: the two take no notice of each other in this step
+  bool decided = false;  ///< by somebody else's outcome
 };
 
 /// A body that began to turn otherwise inside the step. Spins are those with which it would have to begin the

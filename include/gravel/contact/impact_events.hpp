@@ -210,10 +210,18 @@ class ImpactEvents : private detail::ImpactCourses<S> {
         const CollisionOutcome<S> outcome = decide(impact, material, one.v, two.v, v_rel);
         if (outcome.kind != CollisionKind::Bounce) {
           impacts_.push_back(impact);
-          remember(scene, S(0), report);
           if (outcome.kind == CollisionKind::Merge) {
+            remember(scene, S(0), report, true);
             merges_.emplace_back(event.key1, event.key2);
           } else {
+            // Two that part may be driven together again in this step. Those that do not would meet for ever:
+            // they are left to the solver of contacts at its end.
+            const Vector3<S> v1 = one.movable ? outcome.velocity1 : one.v;
+            const Vector3<S> v2 = two.movable ? outcome.velocity2 : two.v;
+            const S parting = n.dot(Vector3<S>(v2 - v1 + drift));
+            const bool ends = !(parting > noise);
+            impacts_.back().rests = ends;
+            remember(scene, std::clamp<S>(parting / speed, S(0), S(1)), report, ends);
             give(scene, event.first, one, outcome.velocity1, outcome.angularVelocity1, t, report);
             give(scene, event.second, two, outcome.velocity2, outcome.angularVelocity2, t, report);
           }

@@ -70,7 +70,7 @@ class ImpactPast {
     return found != names.end() && found->keys == keys;
   }
 
-  /// Whether somebody else has decided about the pair in this step.
+  /// Whether somebody else has decided about the pair in this step, and not that they part.
   bool isDecided(std::uint32_t first, std::uint64_t key2) const {
     for (std::uint32_t k = history_[first].rests; k != none; k = earlier_[k]) {
       if (impacts_[k].decided && impacts_[k].key2 == key2) {
@@ -80,7 +80,7 @@ class ImpactPast {
     return false;
   }
 
-  /// Brought to rest in this step, or decided about.
+  /// Brought to rest in this step, or decided so about.
   bool isAtRest(std::uint32_t first, std::uint64_t key2) const {
     for (std::uint32_t k = history_[first].rests; k != none; k = earlier_[k]) {
       if (impacts_[k].key2 == key2) {
@@ -111,9 +111,9 @@ class ImpactPast {
     return history_[body].after >= scene.settings.mostAfter;
   }
 
-  /// Enters the last impact.
+  /// Enters the last impact. \param ends  the two take no notice of each other any more in this step
   template <class Scene>
-  void remember(const Scene& scene, const S& e, ImpactReport<S>& report) {
+  void remember(const Scene& scene, const S& e, ImpactReport<S>& report, bool ends = false) {
     const Impact<S>& impact = impacts_.back();
     const auto enter = [&](std::uint32_t body, std::uint64_t partner) {
       History& past = history_[body];
@@ -133,7 +133,7 @@ class ImpactPast {
     }
     earlier_.push_back(none);
     // Once a pair: balls without restitution may press on each other a hundred times in a step.
-    if (impact.decided || (impact.rests && !isAtRest(impact.first, impact.key2))) {
+    if (ends || (impact.rests && !isAtRest(impact.first, impact.key2))) {
       earlier_.back() = history_[impact.first].rests;
       history_[impact.first].rests = static_cast<std::uint32_t>(impacts_.size() - 1);
     }

@@ -76,8 +76,8 @@ class Space : public Settings<Scalar> {
 
   // The world around them.
 
-  /// The half-space normal.x >= offset [m] is free. \return the plane's number, which no other plane of this
-  /// space ever gets
+  /// The half-space n.x >= offset [m] is free, n being the normal made unit. \return the plane's number,
+  /// which no other plane of this space ever gets
   std::size_t addPlane(const Vector& normal, Scalar offset, MaterialId material = defaultMaterial);
   /// Planes that look into the box from `low` to `high` [m], but for the faces that are open. \return their
   /// numbers in the order low x, high x, low y, high y, low z, high z, without the open ones

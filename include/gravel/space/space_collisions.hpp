@@ -18,13 +18,19 @@ auto Space<Scalar, Layout>::decideCollisions(const Scalar& time) -> std::vector<
   if (!contact_.collisionHook) {
     return merges;
   }
-  for (const auto& [id1, id2] : contact_.merges()) {
+  auto decided = contact_.merges();
+  for (const auto& [id1, id2] : decided) {
     merges.emplace_back(BodyId{id1}, BodyId{id2});
+  }
+  for (const Impact<Scalar>& impact : impacts()) {
+    if (impact.decided && impact.rests) {
+      decided.emplace_back(impact.key1, impact.key2);
+    }
   }
   const SimulationConfig<Scalar>& c = this->config_;
   const ContactOutcomes<Scalar> ends =
       decideContacts<Scalar>(contacts(), bodies_, contact_.collisionHook, time,
-                             std::max(c.restitutionThreshold, c.epsilon), contact_dt_, contact_.merges());
+                             std::max(c.restitutionThreshold, c.epsilon), contact_dt_, decided);
   for (const auto& [id1, id2] : ends.merges) {
     merges.emplace_back(BodyId{id1}, BodyId{id2});
   }
