@@ -62,12 +62,17 @@ class ContactSolver {
     contacts_ = contacts;
     facts_ = facts;
     fresh_ = true;
+    const bool solved = goesOn_ && inRows_ && problem_.rows.size() == names_.size();
     goesOn_ = false;
+    ended_.clear();
     const bool asMany = contacts.size() == names_.size() && contacts.size() == coloring_.rows().size();
     // The same pairs of the same bodies: colours, and who is remembered, stay.
     if (!asMany || facts.others > 0 || !sameMovable(bodies)) {
       using Rows = std::span<const ContactColoring::Row>;
       before_.take(names_, inRows_ ? rowImpulses_ : restored_, inRows_ ? coloring_.rows() : Rows{});
+      if (solved) {
+        before_.findEnded(contacts.contacts, problem_.rows, bodies, ended_);
+      }
       coloring_.build(contacts.contacts, bodies);
       before_.handOn(contacts.contacts, coloring_.rows(), names_, rowImpulses_);
       handedOn_ = true;
@@ -192,6 +197,8 @@ class ContactSolver {
     return goesOn_ ? problem_.changeOf(coloring_.slotOf(body)) : Vector3<S>(Vector3<S>::Zero());
   }
 
+  /// Those of the solve before the last begin() that it was not given any more, in the order of their keys.
+  const std::vector<detail::EndedContact<S>>& ended() const { return ended_; }
   /// Of the solve before the last one, whose contacts may have been others, in the order of their keys.
   const ContactKeys& earlierKeys(std::size_t k) const {
     return sameNames_ ? names_[k].keys : before_.keys(k);
@@ -292,6 +299,7 @@ class ContactSolver {
   bool inRows_ = true;
   std::vector<ContactImpulse<S>> list_;  ///< of impulses(), if `listed_`
   bool listed_ = false;
+  std::vector<detail::EndedContact<S>> ended_;
   /// Of the solve before, whose contacts have other names unless `sameNames_`.
   detail::EarlierImpulses<S> before_;
   std::vector<Vector3<S>> changes_;  ///< by slot: of workOn()

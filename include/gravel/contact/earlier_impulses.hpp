@@ -5,6 +5,7 @@
 
 #include <gravel/contact/contact_coloring.hpp>
 #include <gravel/contact/impulse_list.hpp>
+#include <gravel/contact/solver_rows.hpp>
 
 #include <numeric>
 #include <span>
@@ -19,6 +20,13 @@ inline void findRows(std::span<const ContactColoring::Row> rows, std::vector<std
   parallelFor(rows.size(), 512,
               [&](std::size_t r) { rowOf[rows[r].contact] = static_cast<std::uint32_t>(r); });
 }
+
+/// A contact that is over, where it was solved last (its gap is not known), and what it bore there.
+template <Real S>
+struct EndedContact {
+  Contact<S> contact;
+  ContactImpulse<S> impulse;
+};
 
 template <Real S>
 class EarlierImpulses {
@@ -49,6 +57,29 @@ class EarlierImpulses {
   /// In the order of the keys.
   std::vector<ContactImpulse<S>> listed() const {
     return impulses_.listed([&](std::size_t k) { return rowOf_[k]; });
+  }
+
+  /// What bore something and is none of these contacts, which are sorted by keys. O(contacts).
+  /// \param solved  the rows in which they were solved
+  template <ContactBodies B>
+  void findEnded(std::span<const Contact<S>> contacts, std::span<const SolverRow<S>> solved, const B& bodies,
+                 std::vector<EndedContact<S>>& ended) const {
+    auto c = contacts.begin();
+    for (std::size_t k = 0; k < names_.size(); ++k) {
+      const auto& [keys, first, second] = names_[k];
+      while (c != contacts.end() && ContactName::of(*c).keys < keys) {
+        ++c;
+      }
+      const bool goesOn = c != contacts.end() && ContactName::of(*c).keys == keys;
+      const bool there = first < bodies.size() && (second < bodies.size() || second == staticPartner);
+      if (!goesOn && there && impulses_.normal(rowOf_[k]) > S(0)) {
+        const SolverRow<S>& row = solved[rowOf_[k]];
+        const S arm1 = row.c1 * S(bodies.radii()[first]);
+        const S arm2 = second == staticPartner ? S(0) : S(row.c2 * S(bodies.radii()[second]));
+        ended.push_back(
+            {{first, second, keys.first, keys.second, row.n, S(0), arm1, arm2}, impulses_.get(rowOf_[k])});
+      }
+    }
   }
 
   /// Hands on what it has of other contacts, zero of those that it does not know. O(contacts).

@@ -293,8 +293,7 @@ class ContactStage {
   mutable std::vector<ContactKeys> struck_;
   bool searched_ = false;  // neighbours_ hold for the whole drift
   ContactList<Scalar> contacts_;
-  std::vector<Contact<Scalar>> before_;  // those that contacts_ took the place of
-  std::uint64_t revision_ = 0;           // of the bodies by whose indices contacts and impacts are
+  std::uint64_t revision_ = 0;  // of the bodies by whose indices contacts and impacts are
   mutable Present present_;
   ContactSolver<Scalar> solver_;
   StepRecord<Scalar> record_;

@@ -71,14 +71,22 @@ template <Real Scalar, class Layout>
 template <class Visit>
 void ContactStage<Scalar, Layout>::forEachBefore(Visit&& visit) const {
   const std::vector<ContactImpulse<Scalar>> impulses = solver_.earlierImpulses();
-  auto c = before_.begin();
+  auto now = contacts_.begin();
+  auto ended = solver_.ended().begin();
+  const auto reaches = [](auto& at, auto end, const ContactKeys& keys, auto&& nameOf) {
+    while (at != end && nameOf(*at).keys < keys) {
+      ++at;
+    }
+    return at != end && nameOf(*at).keys == keys;
+  };
+  const auto ofContact = [](const auto& c) { return ContactName::of(c); };
+  const auto ofEnded = [](const auto& e) { return ContactName::of(e.contact); };
   for (std::size_t k = 0; k < impulses.size(); ++k) {
     const ContactKeys keys = solver_.earlierKeys(k);
-    while (c != before_.end() && ContactKeys{c->key1, c->key2} < keys) {
-      ++c;
-    }
-    if (c != before_.end() && ContactKeys{c->key1, c->key2} == keys) {
-      visit(*c, impulses[k]);
+    if (reaches(now, contacts_.end(), keys, ofContact)) {
+      visit(*now, impulses[k]);
+    } else if (reaches(ended, solver_.ended().end(), keys, ofEnded)) {
+      visit(ended->contact, impulses[k]);
     }
   }
 }
@@ -105,10 +113,10 @@ void ContactStage<Scalar, Layout>::addEnded(const Bodies& bodies, Touches& all) 
     }
   };
   record_.forEachEnded(contacts_, add);
-  if (firstActed_) {
-    StepRecord<Scalar> first;
-    first.add([&](auto&& visit) { forEachBefore(visit); });
-    first.forEachEnded(contacts_, add);
+  for (const detail::EndedContact<Scalar>& first : solver_.ended()) {
+    if (firstActed_) {
+      add(first.contact, first.impulse);
+    }
   }
 }
 

@@ -34,7 +34,6 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
   }
   const char* reason = reasonToSkip(bodies);
   if (reason != nullptr) {
-    std::swap(contacts_.contacts, before_);
     contacts_.clear();
     contactsChanged();
     profiler.skip(Phase::NeighbourSearch, reason);
@@ -53,7 +52,6 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
   }
   settings.before = solver_.names();
   contactsChanged();
-  std::swap(contacts_.contacts, before_);
   if (goesOn && searched && settings.resting->empty() && settings.settled.empty() && report_.postponed == 0) {
     contacts_.clear();
     profiler.skip(Phase::NarrowPhase, "all that met on the way parted again");

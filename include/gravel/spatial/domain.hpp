@@ -163,7 +163,7 @@ class Domain {
     S best_sq = at * at + best[1] * best[1];
     S out = lengths_[0] - near * at;  // [m] in x of the nearest one k boxes out
     for (S k(1); out * out < best_sq; k += S(1), out += lengths_[0]) {
-      for (const S side : {S(near * k), S(-near * k)}) {
+      for (const S& side : {S(near * k), S(-near * k)}) {
         const S x = at - side * lengths_[0];
         const S y = nearest(S(r[1] + (home + side) * shearOffset(time)), 1);
         if (x * x + y * y < best_sq) {
