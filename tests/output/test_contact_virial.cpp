@@ -73,7 +73,7 @@ TEST_CASE("Floors, walls and fixed bodies carry what rests on them, and the viri
 // Seen to fail: what bore a load in the first half of a step, or in a part of it, and was gone at its end did
 // not count (4.5e-4 and 1.2e-3 of the weight were missing; now 5e-6 and 2e-5).
 TEST_CASE("Over time what presses on floor and walls is the momentum that bodies lose to them") {
-  for (const std::size_t parts : {1, 4}) {
+  for (const std::size_t parts : {std::size_t(1), std::size_t(4)}) {
     CAPTURE(parts);
     SimulationConfig<double> config = plain(2e-3);
     config.contactSubsteps = parts;
