@@ -74,8 +74,7 @@ void readBody(TableReader& reader, std::vector<SceneBody>& bodies) {
   Eigen::Vector4d orientation(0, 0, 0, 1);
   reader.numbers<4>("orientation", orientation);
   body.orientation.coeffs() = orientation;
-  const bool hasRadius = reader.has("radius");
-  const bool isPoint = hasRadius == reader.real("radius", body.radius, notNegative()) && body.radius == 0.0;
+  const bool understood = reader.real("radius", body.radius, notNegative()) || !reader.has("radius");
   double density = 0.0;
   const bool hasMass = reader.has("mass");
   const bool hasDensity = reader.has("density");
@@ -84,7 +83,7 @@ void readBody(TableReader& reader, std::vector<SceneBody>& bodies) {
   if (hasMass == hasDensity) {
     reader.missing(hasMass ? "room for both \"mass\" and \"density\": give one" : "\"mass\" or \"density\"");
   } else if (hasDensity) {
-    if (isPoint) {
+    if (understood && body.radius == 0.0) {
       reader.fault("density", "given", "with a radius > 0; what has none needs a \"mass\"");
     }
     body.mass = density * 4.0 / 3.0 * pi<double>() * body.radius * body.radius * body.radius;

@@ -29,16 +29,16 @@ struct Ring {
   double atFloor() const { return amongBalls() * (mass / k) / (1 + mass / k); }
 };
 
-/// How far the upper ball has come down after a time [s], over the radius.
-/// \param slide kinetic friction over static friction
-double sinking(const Ring& ring, double slide, double amongBalls, double atFloor, bool asked, double time) {
-  SimulationConfig<double> config = plain(2e-3);
+/// A floor on which balls without restitution stand. \param slide kinetic friction over static friction
+/// \param asked solve to rounding, nearly; else by the default settings
+Space<double> floorFor(double dt, double slide, double amongBalls, double atFloor, bool asked) {
+  SimulationConfig<double> config = plain(dt);
   config.coeffRestitution = 0;
   config.coeffStaticFriction = amongBalls;
   config.coeffFriction = slide * amongBalls;
   if (asked) {
     config.contactTolerance = 1e-9;
-    config.contactIterations = 2000;
+    config.contactIterations = 3000;
   }
   Space<double> space(config);
   space.setUniformField({0, 0, -g});
@@ -47,6 +47,12 @@ double sinking(const Ring& ring, double slide, double amongBalls, double atFloor
   const MaterialId floor =
       space.addMaterial({.restitution = 0, .staticFriction = ofFloor, .kineticFriction = slide * ofFloor});
   space.addPlane({0, 0, 1}, 0, floor);
+  return space;
+}
+
+/// How far the upper ball has come down after a time [s], over the radius.
+double sinking(const Ring& ring, double slide, double amongBalls, double atFloor, bool asked, double time) {
+  Space<double> space = floorFor(2e-3, slide, amongBalls, atFloor, asked);
   const double d = ring.distance();
   for (int i = 0; i < ring.k; ++i) {
     const double angle = 2 * std::numbers::pi * i / ring.k + 0.3;
@@ -57,6 +63,39 @@ double sinking(const Ring& ring, double slide, double amongBalls, double atFloor
   space.addBody(ball({0, 0, top}, {0, 0, 0}, radius * ring.top, 2.0 * ring.mass));
   space.advanceTo(time);
   return (top - Vec(space.body(static_cast<std::size_t>(ring.k)).position())[2]) / radius;
+}
+
+/// Rows of n, n - 1, ... 1 balls in touch, each row in the hollows of the one below.
+std::vector<Vec> triangle(int n) {
+  std::vector<Vec> centres;
+  for (int row = 0; row < n; ++row) {
+    for (int i = 0; i < n - row; ++i) {
+      centres.emplace_back((2 * i + row) * radius, 0.0, (1 + row * std::sqrt(3.0)) * radius);
+    }
+  }
+  return centres;
+}
+
+/// How far any of these balls has moved, over the radius, after so many steps and after as many again.
+std::array<double, 2> moves(const std::vector<Vec>& centres, double dt, double slide, double amongBalls,
+                            double atFloor, bool asked, std::size_t steps) {
+  Space<double> space = floorFor(dt, slide, amongBalls, atFloor, asked);
+  for (const Vec& centre : centres) {
+    space.addBody(ball(centre, {0, 0, 0}, radius, 1.0));
+  }
+  std::array<double, 2> most{};
+  std::vector<Vec> from = centres;
+  for (double& move : most) {
+    for (std::size_t k = 0; k < steps; ++k) {
+      space.computeDynamics(k);
+    }
+    for (std::size_t i = 0; i < centres.size(); ++i) {
+      const Vec at = space.body(i).position();
+      move = std::max(move, (at - from[i]).norm() / radius);
+      from[i] = at;
+    }
+  }
+  return most;
 }
 
 }  // namespace
@@ -87,57 +126,6 @@ TEST_CASE("It is static friction that holds a structure, however little it has o
     }
   }
 }
-
-namespace {
-
-/// Rows of n, n - 1, ... 1 balls in touch, each row in the hollows of the one below.
-std::vector<Vec> triangle(int n) {
-  std::vector<Vec> centres;
-  for (int row = 0; row < n; ++row) {
-    for (int i = 0; i < n - row; ++i) {
-      centres.emplace_back((2 * i + row) * radius, 0.0, (1 + row * std::sqrt(3.0)) * radius);
-    }
-  }
-  return centres;
-}
-
-/// How far any of these balls has moved, over the radius, after so many steps and after as many again.
-/// \param slide kinetic friction over static friction
-std::array<double, 2> moves(const std::vector<Vec>& centres, double dt, double slide, double amongBalls,
-                            double atFloor, bool asked, std::size_t steps) {
-  SimulationConfig<double> config = plain(dt);
-  config.coeffRestitution = 0;
-  config.coeffStaticFriction = amongBalls;
-  config.coeffFriction = slide * amongBalls;
-  if (asked) {
-    config.contactTolerance = 1e-9;
-    config.contactIterations = 3000;
-  }
-  Space<double> space(config);
-  space.setUniformField({0, 0, -g});
-  const double ofFloor = atFloor * atFloor / amongBalls;  // the coefficient of a pair is the geometric mean
-  space.addPlane(
-      {0, 0, 1}, 0,
-      space.addMaterial({.restitution = 0, .staticFriction = ofFloor, .kineticFriction = slide * ofFloor}));
-  for (const Vec& centre : centres) {
-    space.addBody(ball(centre, {0, 0, 0}, radius, 1.0));
-  }
-  std::array<double, 2> most{};
-  std::vector<Vec> from = centres;
-  for (double& move : most) {
-    for (std::size_t k = 0; k < steps; ++k) {
-      space.computeDynamics(k);
-    }
-    for (std::size_t i = 0; i < centres.size(); ++i) {
-      const Vec at = space.body(i).position();
-      move = std::max(move, (at - from[i]).norm() / radius);
-      from[i] = at;
-    }
-  }
-  return most;
-}
-
-}  // namespace
 
 // The friction that 10 and 15 balls need at the floor, by bisection with sweeps to 1e-9: 0.0561. With 20
 // sweeps a solve they needed 0.072 and 0.080: what forces had not reached yet slid, and went on.

@@ -32,7 +32,7 @@ struct ContactSettings {
 
 /// The most sweeps where nobody says how many: 20, and where contacts are fewer than 200 as many as look at
 /// 4000, up to 1000. A small structure in which forces pass from ball to ball would slip before 20 have found
-/// them; with 20 000 looks a rubble pile of 30 took three times as long.
+/// them. What it costs stands in docs/theory-contact.md.
 inline int mostSweeps(std::size_t contacts) {
   return static_cast<int>(std::clamp<std::size_t>(4000 / std::max<std::size_t>(contacts, 1), 20, 1000));
 }
