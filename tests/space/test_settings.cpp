@@ -4,6 +4,7 @@
 
 #include <limits>
 #include <string>
+#include <utility>
 
 using namespace gravel;
 using namespace gravel::test;
@@ -144,9 +145,27 @@ TEST_CASE("The most contact sweeps can be set between steps, or be left to the n
   space.setContactIterations(7);
   CHECK(space.config().contactIterations == 7);
   CHECK(sweeps() <= 14);
-  CHECK(mostSweeps(0) == 1000);
-  CHECK(mostSweeps(100) == 40);
-  CHECK(mostSweeps(1'000'000) == 20);
+}
+
+// Seen to fail: a tolerance that is the least number above zero became zero, which is refused.
+TEST_CASE("A solve goes as far as somebody says, or as contacts are few and impulses are remembered") {
+  const auto limits = [](std::size_t most, std::size_t contacts, bool remembers, double tolerance = 1e-3) {
+    ContactSettings<double> settings;
+    settings.tolerance = tolerance;
+    limitSweeps(settings, most, contacts, remembers);
+    return std::pair(settings.maxIterations, settings.tolerance);
+  };
+  CHECK(limits(7, 100, true) == std::pair(7, 1e-3));
+  CHECK(limits(7, 100, false) == std::pair(7, 1e-3));
+  CHECK(limits(std::numeric_limits<std::size_t>::max(), 0, false).first == std::numeric_limits<int>::max());
+  CHECK(limits(0, 0, true) == std::pair(1000, 1e-3));
+  CHECK(limits(0, 100, true) == std::pair(40, 1e-3));
+  CHECK(limits(0, 1'000'000, true) == std::pair(20, 1e-3));
+  CHECK(limits(0, 0, false) == std::pair(1000, 1e-5));
+  CHECK(limits(0, 10'000, false) == std::pair(100, 1e-5));
+  CHECK(limits(0, 1'000'000, false) == std::pair(20, 1e-5));
+  const double least = std::numeric_limits<double>::denorm_min();
+  CHECK(limits(0, 1, false, least) == std::pair(1000, least));
 }
 
 // Seen to fail: refused in the middle of the step, by the name of a setting that nobody made.

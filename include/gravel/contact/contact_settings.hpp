@@ -7,12 +7,13 @@
 #include <gravel/core/types.hpp>
 
 #include <algorithm>
+#include <limits>
 #include <span>
 #include <string>
 
 namespace gravel {
 
-/// How contacts are solved. A `Space` takes its own: a tolerance of 1e-3 and mostSweeps() by default.
+/// How contacts are solved. A `Space` takes its own: a tolerance of 1e-3 and limitSweeps().
 template <Real Scalar>
 struct ContactSettings {
   /// [m s^-1] >= 0: restitution acts on an approach faster than this plus what a resting contact picks up in
@@ -30,11 +31,21 @@ struct ContactSettings {
   bool accelerate = true;   ///< momentum between sweeps; off: plain Gauss-Seidel
 };
 
-/// The most sweeps where nobody says how many: 20, and where contacts are fewer than 200 as many as look at
-/// 4000, up to 1000. A small structure in which forces pass from ball to ball would slip before 20 have found
-/// them. What it costs stands in docs/theory-contact.md.
-inline int mostSweeps(std::size_t contacts) {
-  return static_cast<int>(std::clamp<std::size_t>(4000 / std::max<std::size_t>(contacts, 1), 20, 1000));
+/// How far a solve goes where nobody says how many sweeps it may take (`most` is 0): 20, and where contacts
+/// are few as many as look at 4000, up to 1000. If no impulse is remembered, as in a structure that was just
+/// put up, as many as look at a million, and to a hundredth of the tolerance: what slips while forces are
+/// being found may never come to rest again. What it costs stands in docs/theory-contact.md.
+template <Real S>
+void limitSweeps(ContactSettings<S>& settings, std::size_t most, std::size_t contacts, bool remembers) {
+  if (most == 0 && !remembers) {
+    const S least = std::min<S>(settings.tolerance, Eigen::NumTraits<S>::epsilon());
+    settings.tolerance = std::max<S>(S(0.01) * settings.tolerance, least);
+  }
+  if (most == 0) {
+    const std::size_t looks = remembers ? 4000 : 1'000'000;
+    most = std::clamp<std::size_t>(looks / std::max<std::size_t>(contacts, 1), 20, 1000);
+  }
+  settings.maxIterations = static_cast<int>(std::min<std::size_t>(most, std::numeric_limits<int>::max()));
 }
 
 /// Where bodies go after a solve. Contacts are right at the end of the way that follows, as pairs turn on it

@@ -147,6 +147,9 @@ class ContactSolver {
     return correction_.apply(contacts_.contacts, coloring_, bodies, settings, facts_);
   }
 
+  /// Whether the next solve() has an impulse of an earlier one to begin from.
+  bool remembers() const { return rowImpulses_.any(); }
+
   /// The contacts of begin() by name; the view holds until the next one.
   std::span<const ContactName> names() const { return names_; }
 

@@ -8,6 +8,7 @@
 #include <gravel/core/memory.hpp>
 #include <gravel/core/parallel.hpp>
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -40,6 +41,10 @@ class ImpulseList {
   }
 
   bool turns() const { return !turning_.empty(); }
+  /// Whether any contact carries a load.
+  bool any() const {
+    return std::any_of(pushes_.begin(), pushes_.end(), [](const Push& push) { return push.normal > S(0); });
+  }
   const S& normal(std::size_t k) const { return pushes_[k].normal; }
   const Vector3<S>& tangential(std::size_t k) const { return pushes_[k].tangential; }
   Vector3<S> turning(std::size_t k) const {

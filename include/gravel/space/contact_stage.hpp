@@ -130,8 +130,8 @@ class ContactStage {
     settings.restitutionThreshold = std::max(config.restitutionThreshold, config.epsilon);
     settings.tolerance = config.contactTolerance;
     settings.gapStep = gapStep_;
-    const std::size_t most = std::min<std::size_t>(config.contactIterations, std::numeric_limits<int>::max());
-    settings.maxIterations = most > 0 ? static_cast<int>(most) : mostSweeps(contacts_.size());
+    remembers_ = report_.contacts > 0 ? remembers_ : solver_.remembers();
+    limitSweeps(settings, config.contactIterations, contacts_.size(), remembers_);
     solver_.setSettings(settings);
     solver_.rebind(contacts_);  // the space may be a copy
     const HillFrame<Scalar> frame(domain);
@@ -305,6 +305,7 @@ class ContactStage {
   std::vector<std::uint8_t> wasMoved_;     // by body: in the last separation
   bool acted_ = false;                     // the last solve changed velocities
   bool firstActed_ = false;                // so did that of the first half of this part, or of the last one
+  bool remembers_ = false;                 // the first solve of this step had impulses to begin from
   bool known_ = false;                     // narrow_.facts() are of the present contacts
   bool coloured_ = false;                  // solver_ knows the present contacts
   detail::SolvedProblem<Scalar> resumed_;  // what solver_ is to go on from once it has contacts_

@@ -45,7 +45,7 @@ struct SimulationConfig {
   Scalar angularDamping = Scalar(0);         ///< [s^-1] dw/dt = -c w
   Scalar positionalCorrectionFactor = Scalar(0.4);  ///< share of each overlap removed per step
   Scalar contactTolerance = Scalar(1e-3);  ///< contact sweeps end when speeds change by less, relative
-  std::size_t contactIterations = 0;       ///< most contact sweeps per solve, two a step; 0: mostSweeps()
+  std::size_t contactIterations = 0;       ///< most contact sweeps per solve, two a step; 0: limitSweeps()
   std::size_t contactSubsteps = 1;         ///< contact steps per force evaluation; 0: as motion asks
   Scalar sleepSpeed = Scalar(0);           ///< [m s^-1] islands slower than this fall asleep; 0: none does
   Scalar sleepTime = Scalar(0.5);          ///< [s] for which they must have been slower
