@@ -113,3 +113,35 @@ TEST_CASE(
   boundaries.endStep();
   CHECK(boundaries.at(0).velocityAt(0.0) == Vector3<double>(5, 2, -1));
 }
+
+// Seen to fail: half of every change, also of a sudden one.
+TEST_CASE("Along its normal a plane's velocity grows in a step by what goes on changing, and at once else") {
+  Boundaries<double> boundaries;
+  boundaries.add(makePlane<double>({0, 0, 2}, 0.0));
+  const auto swingIn = [&](double speed) {
+    boundaries.setVelocity(0, {0, 0, speed});
+    const double swing = boundaries.at(0).swing();
+    CHECK(boundaries.at(0).velocityAt(0.5) == Vector3<double>(0, 0, speed));
+    CHECK(boundaries.at(0).velocityAt(1.0) == Vector3<double>(0, 0, speed + swing));
+    CHECK(boundaries.at(0).velocityAt(0.25) == Vector3<double>(0, 0, speed - swing / 2));
+    boundaries.endStep();
+    return swing;
+  };
+  CHECK(swingIn(3) == 0);  // a new plane has it
+  CHECK(swingIn(5) == 0);  // sudden
+  CHECK(!boundaries.at(0).isSteady());
+  CHECK(swingIn(5) == 0);
+  CHECK(boundaries.at(0).isSteady());
+  CHECK(swingIn(6) == 0);
+  CHECK(swingIn(8) == 1);   // goes on
+  CHECK(swingIn(16) == 2);  // but by no more than before
+  CHECK(swingIn(15) == 0);  // turns
+  CHECK(swingIn(14) == -0.5);
+  // The mean of the step's parts is the step.
+  boundaries.setVelocity(0, {0, 0, 13});
+  const double before = boundaries.at(0).offset;
+  for (int part = 0; part < 4; ++part) {
+    boundaries.advance(0.25, (part + 0.5) / 4);
+  }
+  CHECK(boundaries.at(0).offset == before + 13);
+}

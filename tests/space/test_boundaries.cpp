@@ -237,8 +237,9 @@ TEST_CASE("A belt on its way to a velocity goes on alike after a restart, a copy
 }
 
 // A plate that shakes with less than g carries the ball along: position to the gap that a resting contact may
-// have, force (over a step from t on) m (g + a(t)) to second order: a central difference of the prescribed
-// path has the relative error (omega dt)^2/12 there. (The first step starts from a plate at rest.)
+// have, force over a step m (g + a) with the a of its middle to second order: what three velocities of the
+// prescribed path tell of it has the relative error 7/24 (omega dt)^2. (The first steps start from a plate at
+// rest; where a changes its sign, steps do not follow what changes.)
 TEST_CASE("A shaking plate that never falls faster than g carries the ball, with the force m (g + a)") {
   const double A = 0.01;
   const double omega = 20.0;  // A omega^2 = 4 m/s^2
@@ -258,10 +259,108 @@ TEST_CASE("A shaking plate that never falls faster than g carries the ball, with
     REQUIRE_THAT(space.body(0).position()[2] - 0.5, WithinAbs(height(space.time()), 1e-7));
     REQUIRE(space.contactCount() == 1);
     const double force = space.contactImpulses()[0].normal / dt;
-    const double mean = 2.0 * (g + A * omega * omega * std::cos(omega * t));
-    worstForce = i == 0 ? 0.0 : std::max(worstForce, std::abs(force - mean));
+    const double mean = 2.0 * (g + A * omega * omega * std::cos(omega * (t + dt / 2)));
+    if (i > 2 && std::abs(std::cos(omega * t)) > 4 * omega * dt) {
+      worstForce = std::max(worstForce, std::abs(force - mean));
+    }
   }
-  CHECK_THAT(worstForce, WithinRel(2.0 * A * omega * omega * std::pow(omega * dt, 2) / 12.0, 0.01));
+  CHECK_THAT(worstForce, WithinRel(2.0 * A * omega * omega * std::pow(omega * dt, 2) * 7.0 / 24.0, 0.01));
+}
+
+/// A plate with the path A (w t - sin w t), so that it is pressed upwards first, and balls on it.
+struct ShakenPlate {
+  double amplitude, omega;
+
+  double height(double t) const { return amplitude * (omega * t - std::sin(omega * t)); }
+  double speed(double t) const { return amplitude * omega * (1 - std::cos(omega * t)); }
+  double acceleration(double t) const { return amplitude * omega * omega * std::sin(omega * t); }
+};
+
+/// Step `i` of the space after one in which the plate stood.
+void shake(Space<double>& space, const ShakenPlate& plate, int i, double dt) {
+  const double t = i * dt;
+  space.setPlaneVelocity(0, {0, 0, (plate.height(t + dt) - plate.height(t)) / dt});
+  advance(space, 1);
+}
+
+// A ball rests on a plate as long as that does not fall faster than g, however fast it rises. At the ends of
+// steps it has the plate's place and velocity. The latter is found from two steps: (omega dt)^2/3 of A omega
+// is lost so, and 2/3 where a change is limited by the one before. For that one reason the force over a step,
+// two velocities over dt, may be off by omega dt of A omega^2. With parts the plate's way in a step is a
+// parabola, whose middle is off by less than (omega dt)^3/6 of A. Seen to fail: the new velocity along the
+// normal at once, when gaps of 7e-3 A opened and shut at 0.9 g, at 3 g with restitution of 1.3e-2 A, the
+// velocity was off by omega dt/2, and forces by 1.1 to 2.8 A omega^2.
+TEST_CASE("A shaking plate carries a ball while it does not fall faster than g, however it bounces") {
+  const double omega = 125;
+  for (const double dt : {1e-3, 2.5e-4}) {
+    for (const double strength : {0.4, 0.9, 3.0, 8.0}) {  // A omega^2/g
+      for (const double e : {0.0, 0.9}) {
+        for (const std::size_t parts : {std::size_t{1}, std::size_t{4}}) {
+          CAPTURE(dt, strength, e, parts);
+          const ShakenPlate plate{strength * g / (omega * omega), omega};
+          SimulationConfig<double> config = plain(dt);
+          config.coeffRestitution = e;
+          config.contactSubsteps = parts;
+          Space<double> space(config);
+          space.addPlane({0, 0, 1}, 0.0);
+          space.setUniformField({0, 0, -g});
+          space.addBody(ball({0, 0, 0.01}, {0, 0, 0}, 0.01, 2.0));
+          advance(space, 1);
+          const double before = space.energyLedger().total();
+          double gap = 0.0, speed = 0.0, force = 0.0;
+          const double turn = strength < 1 ? 2 * pi<double>() : pi<double>() + std::asin(0.9 / strength);
+          for (int i = 0; (i + 1) * dt * omega < turn; ++i) {
+            shake(space, plate, i, dt);
+            const double t = (i + 1) * dt;
+            gap = std::max(gap, std::abs(space.body(0).position()[2] - 0.01 - plate.height(t)));
+            speed = std::max(speed, std::abs(space.body(0).velocity()[2] - plate.speed(t)));
+            force =
+                std::max(force, std::abs(-space.planeForce(0)[2] / 2.0 - g - plate.acceleration(t - dt / 2)));
+          }
+          const double x = omega * dt;
+          CHECK(gap < (parts == 1 ? 1e-12 : x * x * x / 6) * plate.amplitude);
+          CHECK(speed < x * x * plate.amplitude * omega);
+          CHECK(force < x * plate.amplitude * omega * omega);
+          CHECK_THAT(space.energyLedger().total(), WithinAbs(before, 1e-13));
+        }
+      }
+    }
+  }
+}
+
+// Seen to fail: snapshots that forget the last change.
+TEST_CASE("A shaking plate goes on alike after a restart and in a copy") {
+  const TemporaryFile file("plate");
+  const ShakenPlate plate{0.002, 125};
+  for (const std::size_t parts : {std::size_t{1}, std::size_t{4}}) {
+    Space<double> whole = onFloor(1e-3);
+    SimulationConfig<double> config = whole.config();
+    config.contactSubsteps = parts;
+    whole = Space<double>(config);
+    whole.addPlane({0, 0, 1}, 0.0);
+    whole.setUniformField({0, 0, -g});
+    for (int k = 0; k < 3; ++k) {
+      whole.addBody(ball({0, 0, 0.01 + 0.02 * k}, {0, 0, 0}, 0.01, 2.0));
+    }
+    advance(whole, 1);
+    for (int i = 0; i < 200; ++i) {
+      shake(whole, plate, i, 1e-3);
+      if (i % 20 == 10) {
+        whole.save(file.path());
+        Space<double> again;
+        again.restore(file.path());
+        Space<double> copy = whole;
+        for (int k = i + 1; k < i + 5; ++k) {
+          shake(whole, plate, k, 1e-3);
+          shake(again, plate, k, 1e-3);
+          shake(copy, plate, k, 1e-3);
+        }
+        i += 4;
+        CHECK(sameBits(stateOf(whole), stateOf(again)));
+        CHECK(sameBits(stateOf(whole), stateOf(copy)));
+      }
+    }
+  }
 }
 
 // Seen to fail: 4164 blows, nearly all of the plane on a body that is fixed.

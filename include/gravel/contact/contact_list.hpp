@@ -29,6 +29,7 @@ struct ContactSurface {
   /// [m s^-1] to be added to the velocity of the second: of its image in a sheared domain, of a moving
   /// boundary.
   Vector3<Scalar> drift = Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(0));
+  Scalar driftChange = Scalar(0);  ///< [m s^-1] of the drift along the normal in a step: it does not bounce
 
   friend bool operator==(const ContactSurface&, const ContactSurface&) = default;
 };
@@ -88,10 +89,11 @@ struct ContactList {
     surfaces.clear();
   }
 
-  /// Another drift for the contacts c that which(c) tells; those that shared a surface share the new one, and
-  /// surfaces that no contact has are forgotten. O(contacts + surfaces). \return whether there are any
+  /// Another drift, with its change, for the contacts c that which(c) tells; those that shared a surface
+  /// share the new one, and surfaces that no contact has are forgotten. O(contacts + surfaces). \return
+  /// whether there are any
   template <class Which>
-  bool setDrift(const Vector3<Scalar>& drift, Which&& which) {
+  bool setDrift(const Vector3<Scalar>& drift, const Scalar& driftChange, Which&& which) {
     constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
     std::vector<std::array<std::uint32_t, 2>> numbers(surfaces.size(), {none, none});  // old and new drift
     std::vector<ContactSurface<Scalar>> used;
@@ -102,7 +104,10 @@ struct ContactList {
       if (number == none) {
         number = static_cast<std::uint32_t>(used.size());
         used.push_back(surfaces[c.surface]);
-        used.back().drift = other ? drift : used.back().drift;
+        if (other) {
+          used.back().drift = drift;
+          used.back().driftChange = driftChange;
+        }
       }
       c.surface = number;
       any = any || other;

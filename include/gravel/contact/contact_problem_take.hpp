@@ -242,7 +242,9 @@ S ContactProblem<S>::rebound(const Taking<B>& taking, const Group& group, std::s
       [&](std::uint32_t slot) { return Base::accelerationOf(taking.source, taking.colouring, slot); });
   const S b_n = between([&](std::uint32_t slot) { return Base::bendAt(taking.colouring, slot); });
   pull = std::max<S>(pull, S(2) * std::max<S>(detail::sizeOf<S>(a_n), detail::sizeOf<S>(a_n + b_n)));
-  const bool fast = speed > speedIn(S(taking.settings.restitutionThreshold + pull * taking.dt));
+  const S change = detail::sizeOf<S>(taking.contacts.surface(contactOf(taking, group, lane)).driftChange);
+  const bool fast =
+      speed > speedIn(S(taking.settings.restitutionThreshold + S(2) * change + pull * taking.dt));
   const bool impact = v_n < S(0) && fast && speed > allowed;
   rests_[k] = fast ? RowRest::Not : rests_[k];
   marks[k].impact = impact;  // booked otherwise than what rests, by who integrates in time

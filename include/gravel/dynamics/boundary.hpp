@@ -6,6 +6,7 @@
 #include <gravel/bodies/fields.hpp>
 #include <gravel/core/check.hpp>
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -22,13 +23,33 @@ struct Plane {
   /// it along, as a conveyor belt does.
   Vector3<Scalar> velocity = Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(0));
   Vector3<Scalar> velocityBefore = Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(0));  ///< in the last step
-  std::size_t number = 0;  ///< its own among the boundaries of a space, never given twice
+  std::size_t number = 0;           ///< its own among the boundaries of a space, never given twice
+  Scalar changeBefore = Scalar(0);  ///< [m s^-1] along n, of the velocity in the last step
 
-  /// [m s^-1] when a share (0 to 1) of the step has passed. Across n it changes evenly: friction has a weight
-  /// of as much of the step to follow it with. Along n the new one holds at once, as the plane moves.
+  /// Whether it moves in this step as it did at the last one's end.
+  bool isSteady() const { return velocity == velocityBefore && changeBefore == Scalar(0); }
+
+  /// [m s^-1] along n, by which the velocity grows from the middle of the step to its end: half of what
+  /// changes from step to step, but no more than in the step before, and none against it. So what goes on is
+  /// followed, and one sudden change is a blow at the step's start. (A limiter of slopes: van Leer 1977, J.
+  /// Comput. Phys. 23, 276.)
+  Scalar swing() const {
+    const Scalar half = normal.dot(Vector3<Scalar>(velocity - velocityBefore)) / Scalar(2);
+    const Scalar least = std::min<Scalar>(Scalar(0), changeBefore);
+    const Scalar most = std::max<Scalar>(Scalar(0), changeBefore);
+    return std::min<Scalar>(std::max<Scalar>(half, least), most);
+  }
+
+  /// [m s^-1] when a share (0 to 1) of the step has passed. Across n it changes evenly to `velocity`:
+  /// friction has a weight of as much of the step to follow it with. Along n it changes by `swing()` about
+  /// `velocity`, which is that of the step's middle and its mean: what rests on the plane then has the
+  /// velocity of the path at the ends of steps, and gets half of a step's change at its start and half at its
+  /// end, as of its weight.
   Vector3<Scalar> velocityAt(const Scalar& share) const {
     const Vector3<Scalar> change = velocity - velocityBefore;
-    return velocity - (Scalar(1) - share) * Vector3<Scalar>(change - normal.dot(change) * normal);
+    const Vector3<Scalar> across =
+        velocity - (Scalar(1) - share) * Vector3<Scalar>(change - normal.dot(change) * normal);
+    return across + (Scalar(2) * share - Scalar(1)) * swing() * normal;
   }
 };
 
@@ -129,16 +150,18 @@ class Boundaries {
     }
   }
 
-  /// Moves every plane by its velocity over h [s].
-  void advance(const Scalar& h) {
+  /// Moves every plane by its velocity over h [s], in the middle of which a share of the step has passed.
+  void advance(const Scalar& h, const Scalar& share = Scalar(0.5)) {
     for (Plane<Scalar>& plane : planes_) {
-      plane.offset += plane.normal.dot(plane.velocity) * h;
+      const Scalar more = (Scalar(2) * share - Scalar(1)) * plane.swing();
+      plane.offset += (plane.normal.dot(plane.velocity) + more) * h;
     }
   }
 
   /// A step is over, in which all have come to their velocities.
   void endStep() {
     for (Plane<Scalar>& plane : planes_) {
+      plane.changeBefore = plane.normal.dot(Vector3<Scalar>(plane.velocity - plane.velocityBefore));
       plane.velocityBefore = plane.velocity;
     }
     firstNew_ = next_;

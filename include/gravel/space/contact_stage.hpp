@@ -65,9 +65,10 @@ class ContactStage {
   void drivePlanes(const Scalar& share);
 
   /// Before the drift of a step of length h [s] from `time`: deals the impacts inside it, each at its own
-  /// time, so that the drift ends where the bodies are after them. Adds to the report of the step.
+  /// time, so that the drift ends where the bodies are after them. Adds to the report of the step, of which a
+  /// share (`middle`) has passed halfway, for planes that move.
   void strike(Bodies& bodies, const Config& config, const HillFrame<Scalar>& frame, const Scalar& time,
-              const Scalar& h, Profiler& profiler);
+              const Scalar& h, const Scalar& middle, Profiler& profiler);
 
   /// Whether anything touches, or will in the next h [s] while accelerations last. Moves nothing.
   bool foresees(const Bodies& bodies, const Config& config, const Scalar& time, const Scalar& h,
@@ -257,19 +258,19 @@ class ContactStage {
   };
   const Present& present(const Bodies& bodies) const;
 
-  void setDrift(std::size_t plane, const Vector3<Scalar>& drift);
+  void setDrift(std::size_t plane, const Vector3<Scalar>& drift, const Scalar& change);
 
   void renewGeometry(const Bodies& bodies, const Config& config, const Scalar& time);
 
   template <class Course>
   void strike(Bodies& bodies, const Config& config, Course& course, const Scalar& time, const Scalar& h,
-              Profiler& profiler);
+              const Scalar& middle, Profiler& profiler);
 
   template <class Travel>
   void search(const Bodies& bodies, const Config& config, const Scalar& time, const Travel& travel,
               Profiler& profiler);
 
-  void prepareSurfaces(const Config& config);
+  void prepareSurfaces(const Config& config, const Scalar& share = Scalar(0.5));
 
   /// For the next h [s]. Nothing where all are to be looked at.
   std::optional<std::span<const std::uint32_t>> nearBoundaries(const Bodies& bodies, const Scalar& h);

@@ -20,7 +20,7 @@ void ContactStage<Scalar, Layout>::save(SnapshotWriter& out) const {
     numbers.insert(numbers.end(),
                    {plane.normal[0], plane.normal[1], plane.normal[2], plane.offset, plane.velocity[0],
                     plane.velocity[1], plane.velocity[2], plane.velocityBefore[0], plane.velocityBefore[1],
-                    plane.velocityBefore[2]});
+                    plane.velocityBefore[2], plane.changeBefore});
     surfaces.push_back(static_cast<std::uint32_t>(plane.material));
     planeNumbers.push_back(plane.number);
   }
@@ -50,10 +50,10 @@ void ContactStage<Scalar, Layout>::save(SnapshotWriter& out) const {
   std::vector<Scalar> places;
   std::vector<Material<Scalar>> pairs;
   for (const Contact<Scalar>& c : contacts_) {
-    const auto& [material, drift] = contacts_.surface(c);
+    const auto& [material, drift, driftChange] = contacts_.surface(c);
     names.insert(names.end(), {c.first, c.second, c.key1, c.key2});
     places.insert(places.end(), {c.normal[0], c.normal[1], c.normal[2], c.gap, c.arm1, c.arm2, drift[0],
-                                 drift[1], drift[2]});
+                                 drift[1], drift[2], driftChange});
     pairs.push_back(material);
   }
   out.array("names of contacts", names.data(), names.size());
@@ -104,9 +104,10 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
   const auto pairs = in.array<Material<Scalar>>("materials of contacts");
   const auto keys = in.array<std::uint64_t>("keys of impulses");
   const std::vector<Scalar> impulses = in.array<Scalar>("impulses");
-  if (sides.size() != 10 * surfaces.size() || planeNumbers.size() != surfaces.size() + 2 ||
-      2 * impulses.size() != 7 * keys.size() || surfacesOf.empty() || places.size() * 4 != names.size() * 9 ||
-      pairs.size() * 4 != names.size() || ofPairs.size() != 2 * pairMaterials.size()) {
+  if (sides.size() != 11 * surfaces.size() || planeNumbers.size() != surfaces.size() + 2 ||
+      2 * impulses.size() != 7 * keys.size() || surfacesOf.empty() ||
+      places.size() * 4 != names.size() * 10 || pairs.size() * 4 != names.size() ||
+      ofPairs.size() != 2 * pairMaterials.size()) {
     in.fail("holds lists of different lengths");
   }
   materials.assign(std::move(surfacesOf));
@@ -116,19 +117,20 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
   std::vector<Plane<Scalar>> planes;
   for (std::size_t p = 0; p < surfaces.size(); ++p) {
     materials.check(surfaces[p], "plane " + std::to_string(p));
-    const Scalar* side = &sides[10 * p];
+    const Scalar* side = &sides[11 * p];
     planes.push_back({{side[0], side[1], side[2]},
                       side[3],
                       MaterialId{surfaces[p]},
                       {side[4], side[5], side[6]},
                       {side[7], side[8], side[9]},
-                      static_cast<std::size_t>(planeNumbers[p])});
+                      static_cast<std::size_t>(planeNumbers[p]),
+                      side[10]});
   }
   boundaries.assign(std::move(planes), static_cast<std::size_t>(planeNumbers[surfaces.size()]),
                     static_cast<std::size_t>(planeNumbers.back()));
   for (std::size_t k = 0; k < names.size() / 4; ++k) {
     const std::uint64_t* name = &names[4 * k];
-    const Scalar* c = &places[9 * k];
+    const Scalar* c = &places[10 * k];
     contacts_.push_back({static_cast<std::uint32_t>(name[0]),
                          static_cast<std::uint32_t>(name[1]),
                          name[2],
@@ -137,7 +139,7 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
                          c[3],
                          c[4],
                          c[5]},
-                        {pairs[k], {c[6], c[7], c[8]}});
+                        {pairs[k], {c[6], c[7], c[8]}, c[9]});
   }
   std::vector<StoredImpulse<Scalar>> memory(keys.size() / 2);
   for (std::size_t k = 0; k < memory.size(); ++k) {

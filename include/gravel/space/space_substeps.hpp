@@ -50,7 +50,7 @@ struct Space<Scalar, Layout>::Departure {
       space->contact_.endFirstHalf(space->bodies_, kick);
     }
     space->contact_.strike(space->bodies_, space->config_, HillFrame<Scalar>(space->contact_.domain),
-                           Scalar(space->time_ + start), h, space->profiler_);
+                           Scalar(space->time_ + start), h, middle, space->profiler_);
     space->contact_.keepBlows(space->bodies_, since);
   }
 };
@@ -156,7 +156,7 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
     profiler_.skip(Phase::Impacts, alone);
   }
   const auto arrival = [&] {
-    contact_.boundaries.advance(contact_dt_);
+    contact_.boundaries.advance(contact_dt_, halves(2 * part + 1));
     left_.work -= contact_.wrap(bodies_, Scalar(time_ + end), force_.field);
     contact_.detect(bodies_, this->config_, Scalar(time_ + end), contact_dt_, true, profiler_);
     contact_.separate(bodies_, this->config_, Scalar(time_ + end), profiler_);
