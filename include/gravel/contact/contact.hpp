@@ -98,6 +98,7 @@ struct HalfSpace {
   Vector3<Scalar> velocity = Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(0));  ///< [m s^-1] of its matter
   std::uint64_t number = 0;                                ///< by which its contacts are recognised
   std::uint32_t surface = MaterialView<Scalar>::unlisted;  ///< number of its material, if it is an entry
+  Scalar swing = Scalar(0);  ///< [m s^-1] by which it grows along n from the middle of a drift to its end
 };
 
 /// Where two surfaces stand: normal from 1 to 2, gap < 0 for overlap, arms from the centres.

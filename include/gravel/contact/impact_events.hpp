@@ -158,6 +158,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     Vector3<S> n;
     S distance(0);
     S a_n(0);
+    S lead(0);  // of a wall's velocity at the time t before its mean over the drift, along which it goes
     Side one, two;
     Material<S> material;
     const std::uint32_t m1 = bodies.materials()[event.first];
@@ -166,7 +167,8 @@ class ImpactEvents : private detail::ImpactCourses<S> {
       n = -wall.normal;
       distance = bodies.radii()[event.first];
       a_n = -n.dot(scene.acceleration(event.first));
-      drift = wall.velocity;
+      lead = wall.swing * (S(2) * t / h - S(1));
+      drift = wall.velocity + lead * wall.normal;
       one = Side::of(scene, event.first, distance, t);
       material = scene.materials.pair(m1, wall.surface, wall.material);
     } else {
@@ -190,7 +192,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     const Vector3<S> v_rel = two.v - one.v + drift;
     const S v_n = n.dot(v_rel);
     const S noise = S(16) * Eigen::NumTraits<S>::epsilon() * (detail::maxAbs(one.v) + detail::maxAbs(two.v));
-    const bool still = !(v_n < -noise);
+    const bool still = !(v_n + lead < -noise);
     if (still && !(a_n < S(0))) {
       return false;
     }
@@ -231,7 +233,8 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     }
     const S pull = a_n < S(0) ? S(-a_n) : S(0);
     const bool rests = pull > S(0) && (still || S(2) * e * speed <= (S(1) - e) * pull * (h - t));
-    const S target = rests ? S(pull * (h - t) / S(2)) : e * speed;
+    const S bounce = rests ? S(pull * (h - t) / S(2)) : e * speed;
+    const S target = std::max<S>(bounce, S(-lead));  // off the wall's way as well
 
     const MassShares<S> share = massShares<S>(one.mass, one.movable, two.mass, two.movable);
     const S dv_n = target - v_n;
@@ -291,7 +294,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
                         n,
                         distance,
                         {m * dv_n, m * dv_t, m * l, true},
-                        rests || !(target > S(0)),
+                        rests || !(bounce > S(0)),
                         rests && e < S(1) ? S(t + S(2) * e * speed / ((S(1) - e) * pull)) : t});
     remember(scene, e, report);
     return true;

@@ -12,6 +12,13 @@
 
 namespace gravel {
 
+/// A part of a step, in shares of the step: what has passed in its middle, and how long it is.
+template <Real Scalar>
+struct PartOfStep {
+  Scalar middle = Scalar(0.5);
+  Scalar length = Scalar(1);
+};
+
 /// The half-space n.x >= offset is free; bodies rest on its face. n has unit length. The material is looked
 /// up when contacts are made, so that it may change.
 template <Real Scalar>

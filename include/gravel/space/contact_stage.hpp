@@ -65,10 +65,9 @@ class ContactStage {
   void drivePlanes(const Scalar& share);
 
   /// Before the drift of a step of length h [s] from `time`: deals the impacts inside it, each at its own
-  /// time, so that the drift ends where the bodies are after them. Adds to the report of the step, of which a
-  /// share (`middle`) has passed halfway, for planes that move.
+  /// time, so that the drift ends where the bodies are after them. Adds to the report of the step.
   void strike(Bodies& bodies, const Config& config, const HillFrame<Scalar>& frame, const Scalar& time,
-              const Scalar& h, const Scalar& middle, Profiler& profiler);
+              const Scalar& h, const PartOfStep<Scalar>& part, Profiler& profiler);
 
   /// Whether anything touches, or will in the next h [s] while accelerations last. Moves nothing.
   bool foresees(const Bodies& bodies, const Config& config, const Scalar& time, const Scalar& h,
@@ -264,13 +263,13 @@ class ContactStage {
 
   template <class Course>
   void strike(Bodies& bodies, const Config& config, Course& course, const Scalar& time, const Scalar& h,
-              const Scalar& middle, Profiler& profiler);
+              const PartOfStep<Scalar>& part, Profiler& profiler);
 
   template <class Travel>
   void search(const Bodies& bodies, const Config& config, const Scalar& time, const Travel& travel,
               Profiler& profiler);
 
-  void prepareSurfaces(const Config& config, const Scalar& share = Scalar(0.5));
+  void prepareSurfaces(const Config& config, const PartOfStep<Scalar>& part = {});
 
   /// For the next h [s]. Nothing where all are to be looked at.
   std::optional<std::span<const std::uint32_t>> nearBoundaries(const Bodies& bodies, const Scalar& h);

@@ -34,7 +34,7 @@ bool ContactStage<Scalar, Layout>::foresees(const Bodies& bodies, const Config& 
 template <Real Scalar, class Layout>
 void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config,
                                           const HillFrame<Scalar>& frame, const Scalar& time, const Scalar& h,
-                                          const Scalar& middle, Profiler& profiler) {
+                                          const PartOfStep<Scalar>& part, Profiler& profiler) {
   const char* reason = reasonToSkip(bodies);
   if (reason != nullptr) {
     profiler.skip(Phase::Impacts, reason);
@@ -43,17 +43,17 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config,
   if (frame.turns()) {
     EpicycleCourse<Scalar> course(frame, h);
     course.foresee(bodies);
-    strike(bodies, config, course, time, h, middle, profiler);
+    strike(bodies, config, course, time, h, part, profiler);
   } else {
     StraightCourse<Scalar> course;
-    strike(bodies, config, course, time, h, middle, profiler);
+    strike(bodies, config, course, time, h, part, profiler);
   }
 }
 
 template <Real Scalar, class Layout>
 template <class Course>
 void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, Course& course,
-                                          const Scalar& time, const Scalar& h, const Scalar& middle,
+                                          const Scalar& time, const Scalar& h, const PartOfStep<Scalar>& part,
                                           Profiler& profiler) {
   const auto way = [&](std::size_t i) -> Vector3<Scalar> {
     return detail::isMovable(bodies, i) ? Vector3<Scalar>(course.velocity(bodies, i) * h)
@@ -62,7 +62,7 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
   search(bodies, config, time, way, profiler);
   searched_ = true;
   const Profiler::Scope scope(profiler, Phase::Impacts);
-  prepareSurfaces(config, middle);
+  prepareSurfaces(config, part);
   struct Near {
     NeighbourList<Scalar>& list;
     const decltype(way)& travel;

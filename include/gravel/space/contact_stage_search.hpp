@@ -124,12 +124,13 @@ void ContactStage<Scalar, Layout>::search(const Bodies& bodies, const Config& co
 }
 
 template <Real Scalar, class Layout>
-void ContactStage<Scalar, Layout>::prepareSurfaces(const Config& config, const Scalar& share) {
+void ContactStage<Scalar, Layout>::prepareSurfaces(const Config& config, const PartOfStep<Scalar>& part) {
   const std::vector<Material<Scalar>>& surfaces = materials.renewed(config);
   walls_.clear();
   for (const Plane<Scalar>& plane : boundaries.planes()) {
     walls_.push_back({plane.normal, plane.offset, surfaces[static_cast<std::size_t>(plane.material)],
-                      plane.velocityAt(share), plane.number, static_cast<std::uint32_t>(plane.material)});
+                      plane.velocityAt(part.middle), plane.number, static_cast<std::uint32_t>(plane.material),
+                      plane.swing() * part.length});
   }
 }
 

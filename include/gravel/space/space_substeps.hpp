@@ -40,17 +40,17 @@ struct Space<Scalar, Layout>::Departure {
   Scalar start;  ///< [s] since the start of the step
   Scalar since;  ///< [s] since forces were last found
   Scalar h;
-  Scalar middle;  ///< of the part, as a share of the step
-  bool meets;     ///< anything can touch; if not, kick and drift are one pass
+  PartOfStep<Scalar> part;
+  bool meets;  ///< anything can touch; if not, kick and drift are one pass
   explicit operator bool() const { return meets; }
   void operator()(const Scalar& kick) const {
     if (!space->contacts().empty()) {
-      space->contact_.drivePlanes(middle);
+      space->contact_.drivePlanes(part.middle);
       space->resolveCollisions(true);
       space->contact_.endFirstHalf(space->bodies_, kick);
     }
     space->contact_.strike(space->bodies_, space->config_, HillFrame<Scalar>(space->contact_.domain),
-                           Scalar(space->time_ + start), h, middle, space->profiler_);
+                           Scalar(space->time_ + start), h, part, space->profiler_);
     space->contact_.keepBlows(space->bodies_, since);
   }
 };
@@ -150,7 +150,7 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
                             start,
                             apart ? Scalar(0) : start,
                             contact_dt_,
-                            halves(2 * part + 1),
+                            {halves(2 * part + 1), halves(2)},
                             !quiet && (alone == nullptr || !contacts().empty())};
   if (!departure && alone != nullptr) {
     profiler_.skip(Phase::Impacts, alone);
