@@ -3,6 +3,7 @@
 #include "support/temporary_file.hpp"
 #include <gravel/space/space.hpp>
 
+#include <chrono>
 #include <limits>
 
 using namespace gravel;
@@ -592,6 +593,23 @@ TEST_CASE("Bodies whose numbers were spoiled can be removed, one after the other
   space.computeDynamics(1);
   CHECK(space.n() == 2);
   CHECK(std::isfinite(space.energyLedger().total()));
+}
+
+// Seen to fail: each removal looked at all others; a thousand of them took as long as several steps.
+TEST_CASE("Without gravity a thousand of many bodies are removed in less than the time of a step") {
+  using Clock = std::chrono::steady_clock;
+  Space<double> space(quiet());
+  for (int k = 0; k < 120000; ++k) {
+    space.addBody(at({3.0 * (k % 50), 3.0 * (k / 50 % 50), 3.0 * (k / 2500)}));
+  }
+  space.computeDynamics(0);
+  const auto start = Clock::now();
+  space.computeDynamics(1);
+  const auto stepped = Clock::now();
+  for (std::uint64_t k = 0; k < 1000; ++k) {
+    space.removeBody(BodyId{k});
+  }
+  CHECK(Clock::now() - stepped < stepped - start);
 }
 
 // Seen to fail: what contacts had done to its velocity in the step before was taken for support (it left

@@ -65,7 +65,7 @@ template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::removeBody(BodyId id) {
   const std::size_t i = bodies_.indexOf(id);
   bool known = ledgerOpen_;
-  for (std::size_t k = 0; known && k < n(); ++k) {
+  for (std::size_t k = 0; known && !(getG() == Scalar(0)) && k < n(); ++k) {
     known = isFinite(Vector(bodies_.positions()[k]));
   }
   const Scalar energy = known ? bindingEnergy(i, time_) : Scalar(0);
