@@ -100,7 +100,7 @@ class ForceStage {
   /// Power of the user's force at the present velocities [W]; zero without a hook.
   Scalar hookPower(const Bodies<Scalar, Layout>& bodies) const {
     Scalar power(0);
-    for (std::size_t i = 0; i < hookForces_.size() && i < bodies.size(); ++i) {
+    for (std::size_t i = 0; hook && i < hookForces_.size() && i < bodies.size(); ++i) {
       const auto body = bodies[i];
       if (!body.isFixed()) {
         if (body.inverseMass() > Scalar(0)) {
