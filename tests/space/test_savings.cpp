@@ -131,6 +131,36 @@ TEST_CASE("When neighbours were last looked for changes no bit") {
   CHECK(sameBits(stateOf(one), stateOf(two)));
 }
 
+// Contacts of the last step that overlaps with others moved apart are in some lists of neighbours and not in
+// others. Seen to fail: they counted for what bears a body where they were listed (other bits from step 1
+// on).
+TEST_CASE("Nor does it where spheres overlap by half and are thrown apart in a box") {
+  const auto crowd = [] {
+    SimulationConfig<double> config = plain(1e-3);
+    config.coeffRestitution = 0.9;
+    config.coeffFriction = config.coeffStaticFriction = 0.3;
+    config.contactIterations = 20;
+    Space<double> space(config);
+    space.setUniformField({0, 0, -2});
+    space.addBox({-1, -1, -1}, {1, 1, 1});
+    const CounterRandom random(35);
+    for (std::uint64_t k = 0; k < 40; ++k) {
+      const auto u = [&](std::uint64_t c) { return random.uniform(7 * k + c, -1.0, 1.0); };
+      space.addBody(ball({u(0), u(1), u(2)}, {u(3) / 2, u(4) / 2, u(5) / 2}, 0.3 + 0.2 * u(6)));
+    }
+    return space;
+  };
+  Space<double> kept = crowd();
+  Space<double> anew = crowd();
+  for (std::size_t i = 0; i < 40; ++i) {
+    kept.computeDynamics(i);
+    anew.computeDynamics(i);
+    anew.reorderBodies();
+  }
+  CHECK(kept.contactCount() > 40);
+  CHECK(sameBits(stateOf(kept), stateOf(anew)));
+}
+
 TEST_CASE("Friction of coefficient zero is no friction: the same bits as spinning spheres that are smooth") {
   SimulationConfig<double> config = plain(2e-3);
   Space<double> smooth = scene(config);

@@ -258,7 +258,12 @@ class ImpactForecast : protected ImpactPast<S> {
       if (isListed(scene.held, {scene.bodies.ids()[i], scene.bodies.ids()[j]})) {
         Vector3<S> drift;
         const RelativeFlight<S> flight = flightOf(scene, i, j, drift);
-        const Vector3<S> n = detail::safeUnit(flight.place(from));
+        const Vector3<S> r = flight.place(from);
+        const S reach = S(scene.bodies.radii()[i]) + S(scene.bodies.radii()[j]);
+        if (!(detail::safeNorm(r) <= reach + reach / S(1000))) {
+          continue;  // moved apart by overlaps with others: it bears nothing, and is not in every list
+        }
+        const Vector3<S> n = detail::safeUnit(r);
         if (holds(body == i ? Vector3<S>(-n) : n, n.dot(flight.velocity(from)))) {
           return false;
         }
