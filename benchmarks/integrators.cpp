@@ -3,7 +3,7 @@
 /// a range of steps. Writes comma-separated values to standard output:
 ///   problem,integrator,step,seconds,force_calls,energy_error,position_error
 /// (force calls for all bodies; those for some bodies count by their share)
-/// `integrators [problem]`; benchmarks/integrators.py draws the plots. Processor seconds of one thread: set
+/// `bench_integrators [problem]`; benchmarks/integrators.py draws the plots. Processor seconds of one thread: set
 /// OMP_NUM_THREADS=1.
 
 #include "scenes/scenes.hpp"
