@@ -4,7 +4,6 @@
 /// Tiles of bodies in place, for layouts that keep each coefficient of all bodies in a column: passes over
 /// the bodies then need no gathering.
 
-#include <gravel/bodies/body.hpp>
 #include <gravel/bodies/storage.hpp>
 #include <gravel/core/lanes.hpp>
 

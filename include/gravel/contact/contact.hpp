@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <optional>
 #include <span>
-#include <vector>
 
 namespace gravel {
 

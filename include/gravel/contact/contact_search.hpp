@@ -3,15 +3,14 @@
 /// \file
 /// What decides whether two surfaces touch, a gap between them that rests included.
 
+#include <gravel/contact/contact.hpp>
 #include <gravel/contact/contact_bodies.hpp>
 #include <gravel/contact/resting_gap.hpp>
-#include <gravel/core/check.hpp>
 #include <gravel/core/parallel.hpp>
 
 #include <algorithm>
 #include <optional>
 #include <span>
-#include <string>
 
 namespace gravel {
 

@@ -12,7 +12,6 @@
 #include <algorithm>
 #include <optional>
 #include <span>
-#include <string>
 
 namespace gravel {
 

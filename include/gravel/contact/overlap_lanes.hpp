@@ -4,7 +4,6 @@
 /// Overlaps that are opened by moving both bodies, for as many contacts at a time as are one Packed; they
 /// share no movable body.
 
-#include <gravel/contact/contact_list.hpp>
 #include <gravel/contact/row_lanes.hpp>
 
 #include <vector>

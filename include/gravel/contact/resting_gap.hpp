@@ -3,7 +3,6 @@
 /// \file
 /// The gap that a contact at rest may have.
 
-#include <gravel/contact/contact.hpp>
 #include <gravel/core/packed.hpp>
 
 #include <algorithm>

@@ -5,7 +5,6 @@
 
 #include <gravel/contact/impulses.hpp>
 
-#include <algorithm>
 #include <optional>
 
 namespace gravel {

@@ -9,7 +9,6 @@
 #include <gravel/core/short_vectors.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 
 namespace gravel::detail {

@@ -7,7 +7,6 @@
 #include <Eigen/Geometry>
 
 #include <cmath>
-#include <compare>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>

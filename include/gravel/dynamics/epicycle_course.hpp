@@ -3,7 +3,7 @@
 /// \file
 /// Impacts on the way along epicycles.
 
-#include <gravel/contact/impact_events.hpp>
+#include <gravel/core/parallel.hpp>
 #include <gravel/dynamics/epicycle.hpp>
 
 #include <array>

@@ -8,8 +8,6 @@
 #include <gravel/gravity/image_field.hpp>
 #include <gravel/gravity/pair_tiles.hpp>
 
-#include <algorithm>
-
 namespace gravel::detail {
 
 /// Rows of the sources, then, where there are images, of their copies, shifted, then of bodies that only

@@ -17,8 +17,6 @@
 
 #include <gravel/gravity/pair_tiles.hpp>
 
-#include <utility>
-
 namespace gravel::detail {
 
 /// Where the coefficient (a, b, c) of order n = a + b + c stands: at row(n, c) + b.

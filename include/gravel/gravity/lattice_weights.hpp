@@ -3,7 +3,7 @@
 /// \file
 /// The functions that weigh the points and waves of a lattice, for any scalar.
 
-#include <gravel/core/check.hpp>
+#include <gravel/core/types.hpp>
 
 #include <cmath>
 #include <vector>

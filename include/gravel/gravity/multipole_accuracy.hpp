@@ -3,7 +3,9 @@
 /// \file
 /// From a promised error to the order and the limits of a fast multipole sum.
 
-#include <gravel/gravity/multipole_walk.hpp>
+#include <gravel/core/types.hpp>
+
+#include <array>
 
 namespace gravel::detail {
 
