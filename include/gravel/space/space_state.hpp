@@ -90,12 +90,13 @@ std::vector<std::vector<std::size_t>> Space<Scalar, Layout>::collisionGraph() co
   const auto touches = contact_.allTouches(bodies_);
   for (const Contact<Scalar>& c : touches.contacts) {
     if (c.second != staticPartner) {
-      std::vector<std::size_t>& partners = graph[c.first];
-      if (std::find(partners.begin(), partners.end(), c.second) == partners.end()) {
-        partners.push_back(c.second);
-        graph[c.second].push_back(c.first);
-      }
+      graph[c.first].push_back(c.second);
+      graph[c.second].push_back(c.first);
     }
+  }
+  for (std::vector<std::size_t>& partners : graph) {  // a pair may touch more than once in a step
+    std::sort(partners.begin(), partners.end());
+    partners.erase(std::unique(partners.begin(), partners.end()), partners.end());
   }
   return graph;
 }
