@@ -61,7 +61,7 @@ bool isMovable(const B& bodies, std::size_t i) {
   return (bodies.flags()[i] & heldFlags) == 0 && bodies.masses()[i] > S(0);
 }
 
-/// [m s^-1] as it counts: what is written to a fixed body does not move it.
+/// [m s^-1] as it counts: what is written to a body that is fixed or asleep does not move it.
 template <class B>
 auto velocityOf(const B& bodies, std::size_t i) {
   using V = Vector3<std::remove_cvref_t<decltype(bodies.masses()[i])>>;

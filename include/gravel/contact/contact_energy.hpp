@@ -27,8 +27,8 @@ class ContactEnergy {
  public:
   /// Guards the energy of `problem`, fills in the losses of the report, and completes the list of its
   /// impulses, in SI units. O(contacts). \param others the rows are not those of the last call
-  void settle(ContactProblem<S>& problem, const ContactColoring& colouring, const ContactView<S>& contacts,
-              bool others, ContactReport<S>& report) {
+  void book(ContactProblem<S>& problem, const ContactColoring& colouring, const ContactView<S>& contacts,
+            bool others, ContactReport<S>& report) {
     detail::resizeAnew(terms_, problem.rows.size());
     known_ = known_ && !others;
     Sums sums = takeDown(problem, colouring, contacts);

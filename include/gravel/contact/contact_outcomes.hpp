@@ -14,6 +14,7 @@
 
 namespace gravel {
 
+/// What a user decided of the contacts of a step, but for the velocities, which the bodies have by now.
 template <Real Scalar>
 struct ContactOutcomes {
   std::vector<std::pair<std::uint64_t, std::uint64_t>> merges;  ///< ids, in the order of contacts

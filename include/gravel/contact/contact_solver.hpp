@@ -119,7 +119,7 @@ class ContactSolver {
         if (kept_) {
           problem_.keepLast(coloring_, before_.impulses());
         }
-        energy_.settle(problem_, coloring_, contacts, otherRows_, report);
+        energy_.book(problem_, coloring_, contacts, otherRows_, report);
         otherRows_ = false;
         problem_.scatter(bodies, coloring_);
         goesOn_ = true;

@@ -28,11 +28,11 @@ template <Real S>
 class ImpactEvents : private detail::ImpactCourses<S> {
   using Base = detail::ImpactCourses<S>;
   using Base::after;
+  using Base::bouncesNoMore;
   using Base::flightOf;
   using Base::give;
   using Base::history_;
   using Base::impacts_;
-  using Base::isDone;
   using Base::late_;
   using Base::leans_;
   using Base::letGo;
@@ -203,7 +203,8 @@ class ImpactEvents : private detail::ImpactCourses<S> {
       const S fall = scene.heldAlong(event.first, event.second, n);
       threshold = std::max<S>(threshold, fall * h);
     }
-    const bool bounces = !isDone(scene, event.first) && (boundary || !isDone(scene, event.second));
+    const bool bounces =
+        !bouncesNoMore(scene, event.first) && (boundary || !bouncesNoMore(scene, event.second));
     const S e = bounces && speed > threshold ? restitutionAt(material, speed) : S(0);
     if constexpr (!std::is_same_v<Decide, NoDecision>) {
       if (!boundary && speed > threshold) {

@@ -38,7 +38,7 @@ class ImpactForecast : protected ImpactPast<S> {
   using Base::history_;
   using Base::isDecided;
   using Base::isHeld;
-  using Base::isLeft;
+  using Base::isLeftToSolver;
   using Base::isListed;
   using Base::leans_;
   using Event = ImpactEvent<S>;
@@ -170,7 +170,7 @@ class ImpactForecast : protected ImpactPast<S> {
 
   template <class Scene>
   void predictAgain(const Scene& scene, std::span<const Pair> pairs, std::uint32_t body, const S& from) {
-    if (isLeft(scene, body)) {
+    if (isLeftToSolver(scene, body)) {
       return;
     }
     for (std::uint32_t k = start_[body]; k < start_[body + 1]; ++k) {
@@ -208,7 +208,7 @@ class ImpactForecast : protected ImpactPast<S> {
     const auto& [i, j] = pair;
     Vector3<S> drift;
     if (!swept_.mayMeet(i, j, scene.domain, scene.settings.time, scene.settings.h, drift) ||
-        isLeft(scene, i) || isLeft(scene, j) || !detail::canTouch(scene.bodies, i, j)) {
+        isLeftToSolver(scene, i) || isLeftToSolver(scene, j) || !detail::canTouch(scene.bodies, i, j)) {
       return;
     }
     const RelativeFlight<S> flight = flightOf(scene, i, j, drift);

@@ -102,12 +102,12 @@ class ImpactPast {
 
   /// It does not bounce any more.
   template <class Scene>
-  bool isDone(const Scene& scene, std::uint32_t body) const {
+  bool bouncesNoMore(const Scene& scene, std::uint32_t body) const {
     return history_[body].spent >= scene.settings.mostPerBody;
   }
   /// It is left to the solver of simultaneous contacts.
   template <class Scene>
-  bool isLeft(const Scene& scene, std::uint32_t body) const {
+  bool isLeftToSolver(const Scene& scene, std::uint32_t body) const {
     return history_[body].after >= scene.settings.mostAfter;
   }
 
@@ -117,7 +117,7 @@ class ImpactPast {
     const Impact<S>& impact = impacts_.back();
     const auto enter = [&](std::uint32_t body, std::uint64_t partner) {
       History& past = history_[body];
-      const bool before = isDone(scene, body);
+      const bool before = bouncesNoMore(scene, body);
       const S least = S(1) / S(512);
       past.after += before ? 1 : 0;
       past.spent += past.impacts > 0 && past.partner == partner ? least : S(S(1) - e + least);
@@ -125,7 +125,7 @@ class ImpactPast {
       if (past.impacts++ == 0) {
         touched_.push_back(body);
       }
-      report.postponed += isDone(scene, body) && !before ? 1U : 0U;
+      report.postponed += bouncesNoMore(scene, body) && !before ? 1U : 0U;
     };
     enter(impact.first, impact.key2);
     if (impact.second != staticPartner) {

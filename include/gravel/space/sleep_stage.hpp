@@ -132,7 +132,7 @@ class SleepStage {
 
   /// After a step of length h: marks what was touched or pulled otherwise, counts how long each body has been
   /// slow, and notes what is tired.
-  void settle(const Bodies& bodies, const Contacts& contact, const Config& config, const Scalar& h) {
+  void watch(const Bodies& bodies, const Contacts& contact, const Config& config, const Scalar& h) {
     follow(bodies);
     if (!islands_.empty()) {
       number(bodies);

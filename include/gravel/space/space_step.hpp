@@ -97,7 +97,7 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration, const Sc
     left_.work -= contact_.report().driftWork;
     applyDamping();
     if (this->config_.sleepSpeed > Scalar(0)) {
-      sleep_.settle(bodies_, contact_, this->config_, h);
+      sleep_.watch(bodies_, contact_, this->config_, h);
     }
     if (force_.hook) {
       hookPower_ = force_.hookPower(bodies_);
