@@ -43,9 +43,8 @@ class BoundaryContacts {
       const std::vector<ContactSurface<S>>& surfaces = part.surfaces.surfaces();
       surfaces_.insert(surfaces_.end(), surfaces.begin(), surfaces.end());
     }
-    const auto before = [](const Contact<S>& a, const Contact<S>& b) { return keysBefore(a, b); };
-    if (!std::is_sorted(contacts_.begin(), contacts_.end(), before)) {
-      std::sort(contacts_.begin(), contacts_.end(), before);
+    if (!std::is_sorted(contacts_.begin(), contacts_.end(), byKeys)) {
+      std::sort(contacts_.begin(), contacts_.end(), byKeys);
     }
   }
 

@@ -31,7 +31,7 @@ struct ContactKeys {
 };
 
 /// Two bodies, or a body and a boundary, that touch. Named by ids, so that it is recognised in the next step
-/// whatever the bodies' indices are by then; lists are sorted by (key1, key2).
+/// whatever the bodies' indices are by then; lists are sorted by keys().
 template <Real Scalar>
 struct Contact {
   std::uint32_t first;        ///< index of the body of the smaller id
@@ -44,11 +44,11 @@ struct Contact {
   Scalar arm2;                ///< [m] contact to the centre of the second
   std::uint32_t surface = 0;  ///< number of its surface in the list (contact/contact_list.hpp)
 
-  /// True if a comes before b in lists.
-  friend bool keysBefore(const Contact& a, const Contact& b) {
-    return a.key1 != b.key1 ? a.key1 < b.key1 : a.key2 < b.key2;
-  }
+  ContactKeys keys() const { return {key1, key2}; }
 };
+
+/// The order of lists of what has keys().
+inline constexpr auto byKeys = [](const auto& a, const auto& b) { return a.keys() < b.keys(); };
 
 /// A contact as it is recognised: its keys, and the indices that its bodies have now.
 struct ContactName {
@@ -58,7 +58,7 @@ struct ContactName {
 
   template <Real S>
   static ContactName of(const Contact<S>& c) {
-    return {{c.key1, c.key2}, c.first, c.second};
+    return {c.keys(), c.first, c.second};
   }
   friend bool operator==(const ContactName&, const ContactName&) = default;
 };

@@ -21,6 +21,7 @@ struct StoredImpulse {
   std::uint64_t key2;
   ContactImpulse<Scalar> impulse;
 
+  ContactKeys keys() const { return {key1, key2}; }
   friend bool operator==(const StoredImpulse&, const StoredImpulse&) = default;
 };
 
@@ -255,7 +256,7 @@ class ContactSolver {
     listed_ = false;
     for (const StoredImpulse<S>& stored : memory) {
       restored_.set(names_.size(), stored.impulse);
-      names_.push_back({{stored.key1, stored.key2}, staticPartner, staticPartner});
+      names_.push_back({stored.keys(), staticPartner, staticPartner});
     }
     inRows_ = false;
     goesOn_ = false;

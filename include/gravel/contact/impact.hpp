@@ -4,6 +4,7 @@
 /// Impacts inside a step: what they are, what is asked of them and what is reported; and how bodies drift
 /// meanwhile.
 
+#include <gravel/contact/contact.hpp>
 #include <gravel/contact/contact_bodies.hpp>
 #include <gravel/contact/contact_settings.hpp>
 #include <gravel/contact/time_of_impact.hpp>
@@ -50,6 +51,8 @@ struct Impact {
   bool rests;                      ///< it stays in contact for the rest of the step
   Scalar settle;  ///< [s] since the start of the step: when the last of its bounces is over, if it rests
   bool decided = false;  ///< by somebody else's outcome
+
+  ContactKeys keys() const { return {key1, key2}; }
 };
 
 /// A body that began to turn otherwise inside the step. Spins are those with which it would have to begin the

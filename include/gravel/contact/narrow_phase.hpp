@@ -63,9 +63,7 @@ class NarrowPhase {
   template <class B>
   void merge(std::size_t used, const B& bodies, const Domain<S>& domain, const MaterialView<S>& materials,
              const NarrowPhaseSettings<S>& settings, ContactList<S>& out) {
-    const auto before = [](const Contact<S>& wall, const ContactKeys& keys) {
-      return ContactKeys{wall.key1, wall.key2} < keys;
-    };
+    const auto before = [](const Contact<S>& wall, const ContactKeys& keys) { return wall.keys() < keys; };
     const std::vector<Contact<S>>& boundaryContacts = walls_.contacts();
     starts_.assign(1, {0, 0});
     for (std::size_t p = 0; p < used; ++p) {

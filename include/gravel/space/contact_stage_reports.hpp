@@ -201,14 +201,14 @@ std::size_t ContactStage<Scalar, Layout>::touches(const Bodies& bodies) const {
   std::size_t count = ends.size();
   struck_.clear();
   for (const Impact<Scalar>& impact : impacts(bodies)) {
-    struck_.push_back({impact.key1, impact.key2});
+    struck_.push_back(impact.keys());
   }
   std::sort(struck_.begin(), struck_.end());
   struck_.erase(std::unique(struck_.begin(), struck_.end()), struck_.end());
   for (const ContactKeys& keys : struck_) {
-    const auto before = [&](const Contact<Scalar>& c) { return ContactKeys{c.key1, c.key2} < keys; };
+    const auto before = [&](const Contact<Scalar>& c) { return c.keys() < keys; };
     const auto found = std::partition_point(ends.begin(), ends.end(), before);
-    count += found == ends.end() || ContactKeys{found->key1, found->key2} != keys ? 1U : 0U;
+    count += found == ends.end() || found->keys() != keys ? 1U : 0U;
   }
   return count;
 }

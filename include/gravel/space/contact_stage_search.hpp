@@ -161,7 +161,7 @@ std::span<const ContactKeys> ContactStage<Scalar, Layout>::settled() {
   detail::clearSpare(settled_);
   for (const Impact<Scalar>& impact : impacts_.impacts()) {
     if (impact.rests) {
-      settled_.push_back({impact.key1, impact.key2});
+      settled_.push_back(impact.keys());
     }
   }
   std::sort(settled_.begin(), settled_.end());

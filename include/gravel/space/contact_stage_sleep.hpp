@@ -68,11 +68,10 @@ void ContactStage<Scalar, Layout>::dropHeld(const Bodies& bodies) {
   std::vector<StoredImpulse<Scalar>> memory;
   auto next = contacts_.begin();
   for (const StoredImpulse<Scalar>& stored : before) {
-    const ContactKeys keys{stored.key1, stored.key2};
-    while (next != contacts_.end() && ContactKeys{next->key1, next->key2} < keys) {
+    while (next != contacts_.end() && byKeys(*next, stored)) {
       ++next;
     }
-    if (next != contacts_.end() && ContactKeys{next->key1, next->key2} == keys) {
+    if (next != contacts_.end() && next->keys() == stored.keys()) {
       memory.push_back(stored);
     }
   }
@@ -86,15 +85,12 @@ void ContactStage<Scalar, Layout>::add(const ContactList<Scalar>& contacts,
                                        const std::vector<StoredImpulse<Scalar>>& memory) {
   std::vector<StoredImpulse<Scalar>> all = solver_.memory();
   all.insert(all.end(), memory.begin(), memory.end());
-  std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) {
-    return ContactKeys{a.key1, a.key2} < ContactKeys{b.key1, b.key2};
-  });
+  std::sort(all.begin(), all.end(), byKeys);
   solver_.setMemory(all, solver_.memoryStep());
   for (const Contact<Scalar>& c : contacts) {
     contacts_.push_back(c, contacts.surface(c));
   }
-  std::sort(contacts_.begin(), contacts_.end(),
-            [](const Contact<Scalar>& a, const Contact<Scalar>& b) { return keysBefore(a, b); });
+  std::sort(contacts_.begin(), contacts_.end(), byKeys);
   contactsChanged();
   moved_ = false;
 }

@@ -125,7 +125,6 @@ void SleepStage<Scalar, Layout>::findTired(const Bodies& bodies, const Contacts&
 template <Real Scalar, class Layout>
 void SleepStage<Scalar, Layout>::putAside(const Bodies& bodies, Contacts& contact) {
   const std::vector<StoredImpulse<Scalar>> memory = contact.memory();
-  const auto keyOf = [](const auto& x) { return ContactKeys{x.key1, x.key2}; };
   for (SleepingIsland<Scalar>& island : islands_) {
     if (island.state != IslandState::Asleep || island.solved > Scalar(0)) {
       continue;
@@ -133,10 +132,8 @@ void SleepStage<Scalar, Layout>::putAside(const Bodies& bodies, Contacts& contac
     island.solved = contact.memoryStep() > Scalar(0) ? contact.memoryStep() : island.span;
     auto next = memory.begin();
     for (const Contact<Scalar>& c : island.contacts) {
-      next = std::lower_bound(next, memory.end(), keyOf(c), [&](const auto& stored, const ContactKeys& keys) {
-        return keyOf(stored) < keys;
-      });
-      if (next != memory.end() && keyOf(*next) == keyOf(c)) {
+      next = std::lower_bound(next, memory.end(), c, byKeys);
+      if (next != memory.end() && next->keys() == c.keys()) {
         island.memory.push_back(*next);
       }
     }

@@ -30,11 +30,11 @@ class StepRecord {
     entries_.clear();
     auto old = before_.begin();
     forEach([&](const Contact<Scalar>& c, const ContactImpulse<Scalar>& impulse) {
-      for (; old != before_.end() && keysBefore(old->contact, c); ++old) {
+      for (; old != before_.end() && byKeys(old->contact, c); ++old) {
         entries_.push_back(*old);
       }
       entries_.push_back({c, impulse});
-      if (old != before_.end() && !keysBefore(c, old->contact)) {
+      if (old != before_.end() && !byKeys(c, old->contact)) {
         join(entries_.back().sum, (old++)->sum);
       }
     });
@@ -46,10 +46,10 @@ class StepRecord {
   void addTo(std::vector<ContactImpulse<Scalar>>& sum, std::span<const Contact<Scalar>> contacts) const {
     auto entry = entries_.begin();
     for (std::size_t k = 0; k < contacts.size(); ++k) {
-      while (entry != entries_.end() && keysBefore(entry->contact, contacts[k])) {
+      while (entry != entries_.end() && byKeys(entry->contact, contacts[k])) {
         ++entry;
       }
-      if (entry != entries_.end() && !keysBefore(contacts[k], entry->contact)) {
+      if (entry != entries_.end() && !byKeys(contacts[k], entry->contact)) {
         join(sum[k], entry->sum);
       }
     }
@@ -60,10 +60,10 @@ class StepRecord {
   void forEachEnded(std::span<const Contact<Scalar>> contacts, Visit&& visit) const {
     auto c = contacts.begin();
     for (const Entry& entry : entries_) {
-      while (c != contacts.end() && keysBefore(*c, entry.contact)) {
+      while (c != contacts.end() && byKeys(*c, entry.contact)) {
         ++c;
       }
-      if (c == contacts.end() || keysBefore(entry.contact, *c)) {
+      if (c == contacts.end() || byKeys(entry.contact, *c)) {
         visit(entry.contact, entry.sum);
       }
     }
