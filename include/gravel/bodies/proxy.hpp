@@ -71,6 +71,12 @@ class BasicBodyProxy {
   Vector3<Scalar> countingSpin() const {
     return isFixed() ? Vector3<Scalar>(Vector3<Scalar>::Zero()) : Vector3<Scalar>(angularVelocity());
   }
+  /// [J] of its centre and of its spin, as they count.
+  Scalar kineticEnergy() const {
+    return (Scalar(mass()) * Scalar(countingVelocity().squaredNorm()) +
+            inertia() * Scalar(countingSpin().squaredNorm())) /
+           Scalar(2);
+  }
 
   void setMaterial(MaterialId material) const requires(!IsConst) {
     at(fields::Material{}) = static_cast<std::uint32_t>(material);

@@ -90,9 +90,7 @@ class SleepStage {
           continue;
         }
         const auto body = bodies[*i];
-        lost += (Scalar(body.mass()) * Scalar(body.velocity().squaredNorm()) +
-                 body.inertia() * Scalar(body.angularVelocity().squaredNorm())) /
-                Scalar(2);
+        lost += body.kineticEnergy();
         body.setAsleep(true);
       }
     }

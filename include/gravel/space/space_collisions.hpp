@@ -102,18 +102,12 @@ template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::merge(BodyId stays, BodyId goes, const Scalar& time) {
   const std::size_t i = bodies_.indexOf(stays);
   const std::size_t j = bodies_.indexOf(goes);
-  const auto motionOf = [&](std::size_t k) {
-    const BodyProxy one = bodies_[k];
-    return (Scalar(one.mass()) * Scalar(one.countingVelocity().squaredNorm()) +
-            one.inertia() * Scalar(one.countingSpin().squaredNorm())) /
-           Scalar(2);
-  };
   const Body<Scalar> a = bodies_[i].load();
   const Body<Scalar> b = bodies_[j].load();
   Vector r_ab = b.position - a.position;
   Vector v_ab = b.velocity - a.velocity;
   contact_.domain.minimumImage(r_ab, v_ab, time);
-  const Scalar motion = motionOf(i) + motionOf(j);
+  const Scalar motion = bodies_[i].kineticEnergy() + bodies_[j].kineticEnergy();
   const Scalar energy = bindingEnergy(i, time) + bindingEnergy(j, time) - pairEnergy(i, j, time);
   const Vector pull = Vector(bodies_[i].force()) + Vector(bodies_[j].force());
   const Body<Scalar> one = merged(a, b, r_ab, v_ab);
@@ -124,7 +118,7 @@ void Space<Scalar, Layout>::merge(BodyId stays, BodyId goes, const Scalar& time)
   }
   bodies_.remove(goes);
   const std::size_t now = bodies_.indexOf(stays);
-  const Scalar lost = motion - motionOf(now);
+  const Scalar lost = motion - bodies_[now].kineticEnergy();
   left_.restitution += lost;
   left_.exchange += energy - bindingEnergy(now, time) - lost;  // of the potential
 }

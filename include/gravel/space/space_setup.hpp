@@ -207,9 +207,7 @@ Scalar Space<Scalar, Layout>::bindingEnergy(std::size_t i, const Scalar& time) c
   const auto one = bodies_[i];
   const Scalar m = one.mass();
   const Vector x = one.position();
-  Scalar energy = (m * Scalar(one.countingVelocity().squaredNorm()) +
-                   one.inertia() * Scalar(one.countingSpin().squaredNorm())) /
-                  Scalar(2);
+  Scalar energy = one.kineticEnergy();
   if (!one.isFixed()) {
     energy += m * (HillFrame<Scalar>(contact_.domain).potential(x) - force_.field.dot(x));
   }
