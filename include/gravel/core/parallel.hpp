@@ -230,4 +230,24 @@ T orderedSum(std::size_t n, std::size_t chunk, const T& zero, F&& f) {
   return parts[0];
 }
 
+/// The least of `start` and f(i) for i = 0 … n-1, in chunks.
+template <class T, class F>
+T orderedMin(std::size_t n, std::size_t chunk, const T& start, F&& f) {
+  const detail::Chunks chunks(n, chunk);
+  std::vector<T> parts(chunks.count(), start);
+  parallelForTasks(parts.size(), [&](std::size_t c) {
+    for (std::size_t i = chunks.begin(c); i < chunks.end(c); ++i) {
+      const T x = f(i);
+      if (x < parts[c]) {
+        parts[c] = x;
+      }
+    }
+  });
+  T least = start;
+  for (const T& x : parts) {
+    least = x < least ? x : least;
+  }
+  return least;
+}
+
 }  // namespace gravel

@@ -27,29 +27,6 @@ struct StepLimits {
   Scalar contactSteps = Scalar(1);  ///< contact steps in one step: only these must be short against radii
 };
 
-namespace detail {
-
-/// Least value over chunks in their order.
-template <Real Scalar, class F>
-Scalar orderedMin(std::size_t n, std::size_t chunk, const Scalar& start, F&& f) {
-  std::vector<Scalar> parts((n + chunk - 1) / chunk, start);
-  parallelForTasks(parts.size(), [&](std::size_t c) {
-    for (std::size_t i = c * chunk; i < std::min(n, (c + 1) * chunk); ++i) {
-      const Scalar x = f(i);
-      if (x < parts[c]) {
-        parts[c] = x;
-      }
-    }
-  });
-  Scalar least = start;
-  for (const Scalar& x : parts) {
-    least = x < least ? x : least;
-  }
-  return least;
-}
-
-}  // namespace detail
-
 /// The step by the rules above over the movable bodies, within the limits. O(N).
 /// \param anchored something outside the bodies stands still, such as a plane
 template <Real Scalar, class Layout>
@@ -82,7 +59,7 @@ Scalar stepFromMotion(const Bodies<Scalar, Layout>& bodies, const Scalar& soften
   const Scalar spacing = Vector3<Scalar>(high - low).norm() / Scalar(cbrt(static_cast<double>(n)));
   const Scalar floor = std::max<Scalar>(softening, spacing / Scalar(100));
   const Scalar longest = limits.largest / limits.factor;
-  const Scalar least = detail::orderedMin(n, 2048, longest, [&](std::size_t i) {
+  const Scalar least = orderedMin(n, 2048, longest, [&](std::size_t i) {
     const auto body = bodies[i];
     Scalar tau = longest;
     if (body.isFixed()) {
