@@ -75,6 +75,39 @@ class ImpactCourses : protected ImpactForecast<S> {
     }
   }
 
+  /// Resistance to rolling and spinning, for what a blow of dv_n [m s^-1] along the normal left of the turn.
+  /// \return its angular impulse, over the effective radius, and what it does to the energy, <= 0; both over
+  ///   the effective mass
+  template <class Scene>
+  [[gnu::always_inline]] inline std::pair<Vector3<S>, S> resistTurn(const Scene& scene, std::uint32_t first,
+                                                                    std::uint32_t second,
+                                                                    const ImpactMeeting<S>& at,
+                                                                    const MassShares<S>& share, const S& dv_n,
+                                                                    const S& t) {
+    const auto& [one, two, n, distance, a_n, drift, material] = at;
+    const bool boundary = second == staticPartner;
+    Vector3<S> l = Vector3<S>::Zero();
+    if (!(material.rollingFriction > S(0)) && !(material.spinningFriction > S(0))) {
+      return {l, S(0)};
+    }
+    const S q1 = boundary ? S(1) : S(two.r / (one.r + two.r));
+    const S q2 = boundary ? S(0) : S(one.r / (one.r + two.r));
+    const S mobility = share.first * one.spin * q1 * q1 + share.second * two.spin * q2 * q2;
+    if (!(mobility > S(0))) {
+      return {l, S(0)};
+    }
+    const Vector3<S> s1 = one.r * scene.spin(first, t);
+    const Vector3<S> s2 = boundary ? Vector3<S>(Vector3<S>::Zero()) : two.r * scene.spin(second, t);
+    const Vector3<S> rho = q2 * s2 - q1 * s1;
+    l = resistTurning<S>(Vector3<S>(rho / -mobility), n, dv_n, material.rollingFriction,
+                         material.spinningFriction);
+    twist(scene, first, share.first * q1 * one.spin, l, t);
+    if (!boundary) {
+      twist(scene, second, -share.second * q2 * two.spin, l, t);
+    }
+    return {l, l.dot(rho) + mobility * l.squaredNorm() / S(2)};
+  }
+
   /// From t on the body turns as if it had begun the step with spin w.
   template <class Scene>
   void turn(const Scene& scene, std::uint32_t i, const Vector3<S>& w, const S& t) {

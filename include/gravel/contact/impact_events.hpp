@@ -43,6 +43,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
   using Base::predictAll;
   using Base::queue_;
   using Base::remember;
+  using Base::resistTurn;
   using Base::start_;
   using Base::struck_;
   using Base::swept_;
@@ -145,50 +146,88 @@ class ImpactEvents : private detail::ImpactCourses<S> {
   const std::vector<TurnChange<S>>& turns() const { return turns_; }
 
  private:
-  // Blows.
+  using Meeting = detail::ImpactMeeting<S>;
+
+  /// Nothing where the two are not near each other any more.
+  template <class Scene>
+  [[gnu::always_inline]] static inline std::optional<Meeting> meetingAt(const Scene& scene,
+                                                                        const Event& event) {
+    const auto& bodies = scene.bodies;
+    const std::uint32_t m1 = bodies.materials()[event.first];
+    Meeting at;
+    if (event.second == staticPartner) {
+      const HalfSpace<S>& wall = scene.walls[event.wall];
+      at.n = -wall.normal;
+      at.distance = bodies.radii()[event.first];
+      at.a_n = -at.n.dot(scene.acceleration(event.first));
+      at.lead = wall.swing * (S(2) * event.t / scene.settings.h - S(1));
+      at.drift = wall.velocity + at.lead * wall.normal;
+      at.one = Side::of(scene, event.first, at.distance, event.t);
+      at.material = scene.materials.pair(m1, wall.surface, wall.material);
+      return at;
+    }
+    const RelativeFlight<S> flight = flightOf(scene, event.first, event.second, at.drift);
+    const S r1 = bodies.radii()[event.first];
+    const S r2 = bodies.radii()[event.second];
+    // The normal on the straight way of the drift, a h^2/8 at most from the parabola's: the blow then exerts
+    // no torque on the drift's own positions, and keeps its angular momentum to rounding.
+    const auto touch = sphereSphere<S>(Vector3<S>(flight.r + flight.v * event.t), r1, r2, event.key1,
+                                       event.key2, scene.settings.epsilon, r1 + r2);
+    if (!touch) {
+      return std::nullopt;
+    }
+    at.n = touch->normal;
+    at.distance = touch->distance;
+    at.a_n = at.n.dot(flight.a);
+    at.one = Side::of(scene, event.first, touch->arm1, event.t);
+    at.two = Side::of(scene, event.second, touch->arm2, event.t);
+    at.material = scene.materials.pair(m1, bodies.materials()[event.second]);
+    return at;
+  }
+
+  /// Asks somebody else what comes of it, and does that. \param noise [m s^-1] of speeds along n
+  /// \return whether it was anything but a bounce
+  template <class Scene, class Decide>
+  bool isDecidedBy(const Decide& decide, const Scene& scene, const Event& event, const Meeting& at,
+                   const Vector3<S>& v_rel, const S& speed, const S& noise, ImpactReport<S>& report) {
+    const auto& [one, two, n, distance, a_n, drift, lead, material] = at;
+    const S& t = event.t;
+    const Impact<S> impact{event.first, event.second, event.key1, event.key2, t, speed,
+                           n,           distance,     {},         false,      t, true};
+    const CollisionOutcome<S> outcome = decide(impact, material, one.v, two.v, v_rel);
+    if (outcome.kind == CollisionKind::Bounce) {
+      return false;
+    }
+    impacts_.push_back(impact);
+    if (outcome.kind == CollisionKind::Merge) {
+      remember(scene, S(0), report, true);
+      merges_.emplace_back(event.key1, event.key2);
+      return true;
+    }
+    // Two that part may be driven together again in this step. Those that do not would meet for ever: they
+    // are left to the solver of contacts at its end.
+    const Vector3<S> v1 = one.movable ? outcome.velocity1 : one.v;
+    const Vector3<S> v2 = two.movable ? outcome.velocity2 : two.v;
+    const S parting = n.dot(Vector3<S>(v2 - v1 + drift));
+    const bool ends = !(parting > noise);
+    impacts_.back().rests = ends;
+    remember(scene, std::clamp<S>(parting / speed, S(0), S(1)), report, ends);
+    give(scene, event.first, one, outcome.velocity1, outcome.angularVelocity1, t, report);
+    give(scene, event.second, two, outcome.velocity2, outcome.angularVelocity2, t, report);
+    return true;
+  }
 
   /// Deals a blow. \return whether a course changed
   template <class Scene, class Decide>
   bool strike(const Scene& scene, const Event& event, const Decide& decide, ImpactReport<S>& report) {
-    const auto& bodies = scene.bodies;
+    const std::optional<Meeting> at = meetingAt(scene, event);
+    if (!at) {
+      return false;
+    }
+    const auto& [one, two, n, distance, a_n, drift, lead, material] = *at;
     const S& h = scene.settings.h;
     const S& t = event.t;
     const bool boundary = event.second == staticPartner;
-    Vector3<S> drift;
-    Vector3<S> n;
-    S distance(0);
-    S a_n(0);
-    S lead(0);  // of a wall's velocity at the time t before its mean over the drift, along which it goes
-    Side one, two;
-    Material<S> material;
-    const std::uint32_t m1 = bodies.materials()[event.first];
-    if (boundary) {
-      const HalfSpace<S>& wall = scene.walls[event.wall];
-      n = -wall.normal;
-      distance = bodies.radii()[event.first];
-      a_n = -n.dot(scene.acceleration(event.first));
-      lead = wall.swing * (S(2) * t / h - S(1));
-      drift = wall.velocity + lead * wall.normal;
-      one = Side::of(scene, event.first, distance, t);
-      material = scene.materials.pair(m1, wall.surface, wall.material);
-    } else {
-      const RelativeFlight<S> flight = flightOf(scene, event.first, event.second, drift);
-      const S r1 = bodies.radii()[event.first];
-      const S r2 = bodies.radii()[event.second];
-      // The normal on the straight way of the drift, a h^2/8 at most from the parabola's: the blow then
-      // exerts no torque on the drift's own positions, and keeps its angular momentum to rounding.
-      const auto touch = sphereSphere<S>(Vector3<S>(flight.r + flight.v * t), r1, r2, event.key1, event.key2,
-                                         scene.settings.epsilon, r1 + r2);
-      if (!touch) {
-        return false;
-      }
-      n = touch->normal;
-      distance = touch->distance;
-      a_n = n.dot(flight.a);
-      one = Side::of(scene, event.first, touch->arm1, t);
-      two = Side::of(scene, event.second, touch->arm2, t);
-      material = scene.materials.pair(m1, bodies.materials()[event.second]);
-    }
     const Vector3<S> v_rel = two.v - one.v + drift;
     const S v_n = n.dot(v_rel);
     const S noise = S(16) * Eigen::NumTraits<S>::epsilon() * (detail::maxAbs(one.v) + detail::maxAbs(two.v));
@@ -207,29 +246,9 @@ class ImpactEvents : private detail::ImpactCourses<S> {
         !bouncesNoMore(scene, event.first) && (boundary || !bouncesNoMore(scene, event.second));
     const S e = bounces && speed > threshold ? restitutionAt(material, speed) : S(0);
     if constexpr (!std::is_same_v<Decide, NoDecision>) {
-      if (!boundary && speed > threshold) {
-        Impact<S> impact{event.first, event.second, event.key1, event.key2, t, speed,
-                         n,           distance,     {},         false,      t, true};
-        const CollisionOutcome<S> outcome = decide(impact, material, one.v, two.v, v_rel);
-        if (outcome.kind != CollisionKind::Bounce) {
-          impacts_.push_back(impact);
-          if (outcome.kind == CollisionKind::Merge) {
-            remember(scene, S(0), report, true);
-            merges_.emplace_back(event.key1, event.key2);
-          } else {
-            // Two that part may be driven together again in this step. Those that do not would meet for ever:
-            // they are left to the solver of contacts at its end.
-            const Vector3<S> v1 = one.movable ? outcome.velocity1 : one.v;
-            const Vector3<S> v2 = two.movable ? outcome.velocity2 : two.v;
-            const S parting = n.dot(Vector3<S>(v2 - v1 + drift));
-            const bool ends = !(parting > noise);
-            impacts_.back().rests = ends;
-            remember(scene, std::clamp<S>(parting / speed, S(0), S(1)), report, ends);
-            give(scene, event.first, one, outcome.velocity1, outcome.angularVelocity1, t, report);
-            give(scene, event.second, two, outcome.velocity2, outcome.angularVelocity2, t, report);
-          }
-          return true;
-        }
+      if (!boundary && speed > threshold &&
+          isDecidedBy(decide, scene, event, *at, v_rel, speed, noise, report)) {
+        return true;
       }
     }
     const S pull = a_n < S(0) ? S(-a_n) : S(0);
@@ -259,26 +278,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
       }
       twist(scene, event.second, share.second * two.c * two.spin, n.cross(dv_t), t);
     }
-    // Resistance to rolling and spinning, for what the blow left of the turn.
-    Vector3<S> l = Vector3<S>::Zero();
-    S turned(0);
-    if (material.rollingFriction > S(0) || material.spinningFriction > S(0)) {
-      const S q1 = boundary ? S(1) : S(two.r / (one.r + two.r));
-      const S q2 = boundary ? S(0) : S(one.r / (one.r + two.r));
-      const S turnMobility = share.first * one.spin * q1 * q1 + share.second * two.spin * q2 * q2;
-      if (turnMobility > S(0)) {
-        const Vector3<S> s1 = one.r * scene.spin(event.first, t);
-        const Vector3<S> s2 = boundary ? Vector3<S>(Vector3<S>::Zero()) : two.r * scene.spin(event.second, t);
-        const Vector3<S> rho = q2 * s2 - q1 * s1;
-        l = resistTurning<S>(Vector3<S>(rho / -turnMobility), n, dv_n, material.rollingFriction,
-                             material.spinningFriction);
-        turned = l.dot(rho) + turnMobility * l.squaredNorm() / S(2);
-        twist(scene, event.first, share.first * q1 * one.spin, l, t);
-        if (!boundary) {
-          twist(scene, event.second, -share.second * q2 * two.spin, l, t);
-        }
-      }
-    }
+    const auto [l, turned] = resistTurn(scene, event.first, event.second, *at, share, dv_n, t);
     const S& m = share.effective;
     const Vector3<S> slipAfter = slip + mobility * dv_t;
     const Vector3<S> supported = two.supported - one.supported;

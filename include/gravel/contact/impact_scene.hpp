@@ -114,6 +114,19 @@ struct ImpactSide {
   }
 };
 
+/// The two sides of a blow at its moment, the second of which may be a boundary.
+template <Real S>
+struct ImpactMeeting {
+  ImpactSide<S> one, two;
+  Vector3<S> n;       ///< from the first to the second
+  S distance = S(0);  ///< [m] of the centres; to a boundary the radius
+  S a_n = S(0);       ///< [m s^-2] of the second relative to the first, along n
+  Vector3<S> drift;   ///< [m s^-1] of the second besides its own velocity: of an image, of a boundary
+  S lead =
+      S(0);  ///< [m s^-1] of a boundary's velocity now before its mean over the drift, along which it goes
+  Material<S> material;
+};
+
 }  // namespace detail
 
 }  // namespace gravel
