@@ -3,8 +3,8 @@
 /// a range of steps. Writes comma-separated values to standard output:
 ///   problem,integrator,step,seconds,force_calls,energy_error,position_error
 /// (force calls for all bodies; those for some bodies count by their share)
-/// `bench_integrators [problem]`; benchmarks/integrators.py draws the plots. Processor seconds of one thread: set
-/// OMP_NUM_THREADS=1.
+/// `bench_integrators [problem]`; benchmarks/integrators.py draws the plots. Processor seconds of one thread:
+/// set OMP_NUM_THREADS=1.
 
 #include "scenes/scenes.hpp"
 #include "stopwatch.hpp"
