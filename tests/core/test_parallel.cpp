@@ -134,6 +134,19 @@ TEST_CASE("parallel: ordered sums of vectors, of one chunk and of none", "[paral
   CHECK(calls == 0);
 }
 
+// Seen to fail: a chunk without its last value.
+TEST_CASE("parallel: the least value is found wherever it stands, and none is below the start",
+          "[parallel]") {
+  for (const std::size_t least : {std::size_t{0}, std::size_t{6}, std::size_t{7}, std::size_t{99}}) {
+    const auto value = [&](std::size_t i) { return i == least ? -2.0 : static_cast<double>(i); };
+    for (const std::size_t chunk : {std::size_t{0}, std::size_t{7}, std::size_t{1000}}) {
+      CHECK(orderedMin(std::size_t{100}, chunk, 1.0, value) == -2.0);
+      CHECK(orderedMin(std::size_t{100}, chunk, -3.0, value) == -3.0);
+      CHECK(orderedMin(std::size_t{0}, chunk, 1.0, value) == 1.0);
+    }
+  }
+}
+
 TEST_CASE("parallel: with two threads two chunks run at the same time", "[parallel]") {
   const WithThreads scope(2);
   std::atomic<int> started{0};
