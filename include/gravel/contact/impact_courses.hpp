@@ -84,7 +84,7 @@ class ImpactCourses : protected ImpactForecast<S> {
                                                                     const ImpactMeeting<S>& at,
                                                                     const MassShares<S>& share, const S& dv_n,
                                                                     const S& t) {
-    const auto& [one, two, n, distance, a_n, drift, material] = at;
+    const auto& [one, two, n, distance, a_n, drift, lead, material] = at;
     const bool boundary = second == staticPartner;
     Vector3<S> l = Vector3<S>::Zero();
     if (!(material.rollingFriction > S(0)) && !(material.spinningFriction > S(0))) {
