@@ -64,11 +64,11 @@ TEST_CASE("A column of ten carries its weight, contact by contact, and stays whe
 
 // Equal balls that alternate between mass 1 and 1000, and one of 1000 on five of 1, at the step of a game.
 // With 20 sweeps, which end before forces are found in the first steps, the heavy ones sink on the way, by
-// 7 g dt^2. So few contacts get up to 666 by default, and sink by what the tolerance lets pass: 1e-3 g dt^2
+// 5 g dt^2. So few contacts get up to 666 by default, and sink by what the tolerance lets pass: 1e-3 g dt^2
 // times the ten sweeps or so in which a disturbance gets through, in each of two solves. Asked for, the solve
 // from nothing is right, and in ten seconds nothing sinks by more than 1e-6 g dt 10 s.
 // Seen to fail: no momentum between sweeps with friction (73 g dt^2, and the column of the heavy one parts);
-// 20 sweeps by default (7 g dt^2).
+// 20 sweeps by default (5 g dt^2).
 TEST_CASE("Stacks of mass ratio 1000 stand at a step of 1/60 s") {
   struct Solve {
     std::size_t sweeps;
@@ -76,7 +76,7 @@ TEST_CASE("Stacks of mass ratio 1000 stand at a step of 1/60 s") {
     double deepest;  // [m]
   };
   const double dt = 1.0 / 60;
-  for (const Solve& solve : {Solve{20, 1e-3, 9 * g * dt * dt}, Solve{0, 1e-3, 0.02 * g * dt * dt},
+  for (const Solve& solve : {Solve{20, 1e-3, 7 * g * dt * dt}, Solve{0, 1e-3, 0.02 * g * dt * dt},
                              Solve{1000, 1e-6, 1e-6 * g * dt * 10}}) {
     for (const bool alternate : {false, true}) {
       SimulationConfig<double> config = plain(dt);
@@ -108,6 +108,32 @@ TEST_CASE("Stacks of mass ratio 1000 stand at a step of 1/60 s") {
         CHECK(space.body(k).position().head<2>().norm() == 0.0);
       }
     }
+  }
+}
+
+// A ball on a light one on a floor, overlapping it by 0.04 radii. A sweep carries the light one to and fro
+// between its two neighbours, and lifts the ball by 1/(1 + ratio) of what is still missing to 0.4 of the
+// overlap. So a step of 1000 sweeps, what two contacts get, takes 0.4 (1 - exp(-1000/ratio)) of the overlap.
+// The steps to a quarter, and two more: the first one shares the overlap between the contacts, and the last
+// one is not whole. Seen to fail: 20 sweeps (175 and 1665 steps).
+TEST_CASE("A heavy ball pressed into a light one is lifted off by as many sweeps as few contacts get") {
+  for (const double ratio : {1e3, 1e4}) {
+    Space<double> space(plain(1.0 / 60));
+    space.setUniformField({0, 0, -g});
+    space.addPlane({0, 0, 1}, 0.0);
+    space.addBody(ball({0, 0, radius}, {0, 0, 0}, radius, 1.0));
+    space.addBody(ball({0, 0, 2.96 * radius}, {0, 0, 0}, radius, ratio));
+    std::size_t steps = 0;
+    for (double deepest = 1; deepest > 0.01 * radius && steps < 2000; ++steps) {
+      space.computeDynamics(steps);
+      deepest = 0;
+      for (const Contact<double>& c : space.contacts()) {
+        deepest = std::max(deepest, -c.gap);
+      }
+    }
+    const double expected = std::log(4.0) / -std::log1p(-0.4 * -std::expm1(-1000 / ratio));
+    CAPTURE(ratio, steps, expected);
+    CHECK(std::abs(static_cast<double>(steps) - expected) <= 2);
   }
 }
 

@@ -31,6 +31,11 @@ struct ContactSettings {
   bool accelerate = true;   ///< momentum between sweeps; off: plain Gauss-Seidel
 };
 
+/// As many sweeps as look at so many contacts, from 20 to 1000.
+inline int sweepsOfLooks(std::size_t looks, std::size_t contacts) {
+  return static_cast<int>(std::clamp<std::size_t>(looks / std::max<std::size_t>(contacts, 1), 20, 1000));
+}
+
 /// How far a solve goes where nobody says how many sweeps it may take (`most` is 0): 20, and where contacts
 /// are few as many as look at 4000, up to 1000. If no impulse is remembered, as in a structure that was just
 /// put up, as many as look at a million, and to a hundredth of the tolerance: what slips while forces are
@@ -41,11 +46,9 @@ void limitSweeps(ContactSettings<S>& settings, std::size_t most, std::size_t con
     const S least = std::min<S>(settings.tolerance, Eigen::NumTraits<S>::epsilon());
     settings.tolerance = std::max<S>(S(0.01) * settings.tolerance, least);
   }
-  if (most == 0) {
-    const std::size_t looks = remembers ? 4000 : 1'000'000;
-    most = std::clamp<std::size_t>(looks / std::max<std::size_t>(contacts, 1), 20, 1000);
-  }
-  settings.maxIterations = static_cast<int>(std::min<std::size_t>(most, std::numeric_limits<int>::max()));
+  settings.maxIterations =
+      most == 0 ? sweepsOfLooks(remembers ? 4000 : 1'000'000, contacts)
+                : static_cast<int>(std::min<std::size_t>(most, std::numeric_limits<int>::max()));
 }
 
 /// Where bodies go after a solve. Contacts are right at the end of the way that follows, as pairs turn on it

@@ -85,8 +85,7 @@ class ContactStage {
   /// Adds what ended inside the step, with what it bore until then. A pair may be there twice. O(contacts).
   void addEnded(const Bodies& bodies, Touches& all) const;
 
-  /// Shrinks overlaps by moving bodies, and renews the geometry of the contacts, so that impulses act where
-  /// the bodies are.
+  /// Shrinks overlaps by moving bodies, and renews the geometry of the contacts, on which impulses act.
   void separate(Bodies& bodies, const Config& config, const Scalar& time, Profiler& profiler) {
     moved_ = false;
     separationLoss_ = Scalar(0);
@@ -101,9 +100,10 @@ class ContactStage {
       return;
     }
     const Profiler::Scope scope(profiler, Phase::PositionalCorrection);
-    CorrectionSettings<Scalar> settings;
-    settings.factor = config.positionalCorrectionFactor;
-    settings.keepAngularMomentum = domain.isOpen();  // images have none to keep
+    const CorrectionSettings<Scalar> settings{
+        .factor = config.positionalCorrectionFactor,
+        .maxIterations = sweepsOfLooks(4000, contacts_.size()),
+        .keepAngularMomentum = domain.isOpen()};  // images have none to keep
     separationLoss_ = solver_.correctPositions(bodies, settings).loss;
     moved_ = !solver_.displacements().empty();
     if (moved_) {
