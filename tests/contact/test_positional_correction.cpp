@@ -280,6 +280,23 @@ TEST_CASE("2 to 100 spheres at one point come apart, finitely, with their centre
   }
 }
 
+// A ball of diameter 1 between planes 0.9 apart: every sweep pushes it to the other plane.
+// Seen to fail: sweeps as long as anything moves (1000).
+TEST_CASE("sweeps end where there is no room, however many are allowed") {
+  Bodies<double, SoA> bodies;
+  Body<double> body;
+  body.radius = 0.5;
+  body.position = {0, 0, 0.45};
+  bodies.add(body);
+  std::vector<HalfSpace<double>> planes = floorAtZero<double>();
+  planes.push_back({{0, 0, -1}, -0.9});
+  CorrectionSettings<double> settings;
+  settings.maxIterations = 1000;
+  PositionalCorrection<double> correction;
+  CHECK(correct(bodies, contactsOf(bodies, Material<double>{}, planes), settings, correction).iterations <=
+        60);
+}
+
 TEST_CASE("far from the origin an overlap opens as well as the numbers there can tell") {
   Bodies<double, SoA> bodies;
   Body<double> body;

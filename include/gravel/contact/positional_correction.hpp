@@ -103,6 +103,8 @@ class PositionalCorrection {
         watch_.enterFirst(k, deep_[colouring.rows()[k].contact] == 0);
       }
     });
+    S before = Eigen::NumTraits<S>::highest();  // largest move of the last sweep that was looked at
+    bool falls = true;
     do {
       const auto open = [&](std::size_t begin, std::size_t end, Opened& sum) {
         const auto stale = [&](std::size_t k) {
@@ -119,7 +121,11 @@ class PositionalCorrection {
       report.residual = opened.largest;
       report.loss += opened.loss;
       ++report.iterations;
-    } while (report.residual > enough && report.iterations < settings.maxIterations);
+      if (report.iterations % patience == 0) {
+        falls = report.residual < before;
+        before = report.residual;
+      }
+    } while (report.residual > enough && falls && report.iterations < settings.maxIterations);
     move(colouring, bodies);
     return report;
   }
@@ -132,6 +138,7 @@ class PositionalCorrection {
   using Body = detail::ShiftedBody<S>;
   using Bodies = detail::ShiftedLanes<S>;
   static constexpr std::size_t chunk = 512;
+  static constexpr int patience = 20;  ///< sweeps; where moves are no less after them, there is no room
 
   /// What a sweep did.
   struct Opened {
