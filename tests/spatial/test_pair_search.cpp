@@ -28,6 +28,20 @@ IdPairs search(BroadPhaseKind kind, const Cloud<S>& cloud, double margin, const 
   return named(pairs, cloud);
 }
 
+/// A tree that counts what its queries meet.
+template <class S>
+struct Counting {
+  const KDTree<S>& tree;
+  std::size_t& met;
+  template <class Visit>
+  void forEachWithin(const Vector3<S>& q, S radius, Visit&& visit) const {
+    tree.forEachWithin(q, radius, [&](std::size_t i, S distance_sq) {
+      ++met;
+      visit(i, distance_sq);
+    });
+  }
+};
+
 }  // namespace
 
 TEMPLATE_TEST_CASE("every method finds the pairs of brute force, in the promised order", "",
@@ -201,6 +215,30 @@ TEST_CASE("bodies far from one another and from the origin are found by their di
   for (const BroadPhaseKind kind : everyKind) {
     CHECK(search(kind, cloud, 0.0, Domain<double>::open(), 0.0) == expected);
   }
+}
+
+// Seen to fail: all looked 16 roundings of the farthest coordinate around, at 1e15 m 3.6 m, and the search of
+// 20 000 bodies took 3.7 s instead of 0.03 s.
+TEMPLATE_TEST_CASE("one body far away makes no other one look farther", "", float, double, long double) {
+  using S = TestType;
+  Cloud<S> cloud = randomCloud<S>(400, 1.0, 0.02, 1.0, 27);
+  const auto met = [&] {
+    std::vector<detail::Sphere<S>> spheres;
+    detail::gatherSpheres(cloud.positions, cloud.radii, cloud.ids, Domain<S>::open(), S(0), spheres);
+    KDTree<S> tree;
+    tree.build(detail::Homes<S>{&spheres});
+    std::vector<std::vector<Pair>> parts;
+    std::vector<Pair> pairs;
+    std::size_t count = 0;
+    detail::findPairsByQueries(Counting<S>{tree, count}, spheres, S(0), Domain<S>::open(), S(0), parts,
+                               pairs);
+    CHECK(named(pairs, cloud) == brutePairs(cloud, S(0), Domain<S>::open(), S(0)));
+    return count;
+  };
+  cloud.positions[0] = Vector3<S>(S(3), S(3), S(3));
+  const std::size_t near = met();
+  cloud.positions[0] *= S(1) / std::numeric_limits<S>::epsilon();
+  CHECK(met() == near);
 }
 
 TEST_CASE("the automatic choice: all pairs for few bodies, the k-d tree for crowded clumps, else the grid") {

@@ -50,7 +50,7 @@ class KDTree {
     if constexpr (!std::is_same_v<S, Cut>) {  // the rounding of both points to Cut
       constexpr Cut eps = std::numeric_limits<Cut>::epsilon();
       cutRadius =
-          (cutRadius + eps * (tree_->extent + centre.cwiseAbs().maxCoeff()) * Cut(4)) * (Cut(1) + 8 * eps);
+          (cutRadius + eps * (cutRadius + centre.cwiseAbs().maxCoeff()) * Cut(8)) * (Cut(1) + 128 * eps);
     }
     ball.cutRadius_sq = cutRadius * cutRadius;
     tree_->index.findNeighbors(ball, centre.data(), {});
@@ -79,16 +79,12 @@ class KDTree {
     explicit Tree(std::vector<Vector3<S>> points)
         : cloud{std::move(points)}, index(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(10)) {
       index.buildIndex();
-      for (const Vector3<S>& x : cloud.points) {
-        extent = std::max(extent, static_cast<Cut>(x.cwiseAbs().maxCoeff()));
-      }
     }
     Tree(const Tree&) = delete;
     Tree& operator=(const Tree&) = delete;
 
     Cloud cloud;
     Index index;
-    Cut extent = Cut(0);
   };
 
   /// nanoflann's result set: hands each hit on instead of keeping it.

@@ -35,13 +35,15 @@ struct LargestRadii {
     }
   }
 
-  /// How far body i must look, with room for the rounding of a search's own arithmetic on coordinates of
-  /// magnitude `extent`.
-  S reach(const std::vector<Sphere<S>>& spheres, std::size_t i, const S& margin, const S& extent) const {
+  /// How far body i must look, with room for the rounding of a search's own arithmetic: of sums of squares
+  /// down a tree, and on coordinates near those of the body, not of others that may be far away.
+  /// \param images [m] from the body to its images
+  S reach(const std::vector<Sphere<S>>& spheres, std::size_t i, const S& margin, const S& images) const {
     const S r = spheres[i].radius;
     const S other = i == owner ? second : r;
     const S eps(std::numeric_limits<S>::epsilon());
-    return (r + other + margin) * (S(1) + S(16) * eps) + S(16) * eps * extent;
+    const S rounding = S(16) * eps * (spheres[i].home.cwiseAbs().maxCoeff() + images);
+    return (r + other + margin) * (S(1) + S(128) * eps) + rounding;
   }
 };
 
@@ -91,13 +93,7 @@ void findPairsByQueries(const Index& index, const std::vector<Sphere<S>>& sphere
                         const Domain<S>& domain, const S& time, std::vector<std::vector<Pair>>& parts,
                         std::vector<Pair>& out) {
   const LargestRadii<S> radii(spheres);
-  S extent(0);
-  for (const Sphere<S>& s : spheres) {
-    extent = std::max<S>(extent, s.home.cwiseAbs().maxCoeff());
-  }
-  if (!domain.isOpen()) {
-    extent += S(2) * domain.lengths().maxCoeff();
-  }
+  const S images = domain.isOpen() ? S(0) : S(S(2) * domain.lengths().maxCoeff());
   constexpr std::size_t chunk = 256;
   parts.resize((spheres.size() + chunk - 1) / chunk);
   parallelForChunks(spheres.size(), chunk, [&](std::size_t begin, std::size_t end) {
@@ -107,7 +103,7 @@ void findPairsByQueries(const Index& index, const std::vector<Sphere<S>>& sphere
       if (!(spheres[i].radius > S(0))) {
         continue;
       }
-      const S reach = radii.reach(spheres, i, margin, extent);
+      const S reach = radii.reach(spheres, i, margin, images);
       forEachImage(spheres[i].home, reach, domain, time, [&](const Vector3<S>& q) {
         index.forEachWithin(q, reach, [&](std::size_t j, S) {
           if (asksFor(spheres[i], spheres[j])) {
