@@ -260,7 +260,7 @@ class Space : public Settings<Scalar> {
   bool placesChanged() const;
   Scalar bindingEnergy(std::size_t i, const Scalar& time) const;
   std::vector<std::pair<BodyId, BodyId>> decideCollisions(const Scalar& time);
-  void decideTouching();
+  std::vector<std::pair<BodyId, BodyId>> decideTouching();
   void mergeCollided(const std::vector<std::pair<BodyId, BodyId>>& merges, const Scalar& time);
   void merge(BodyId stays, BodyId goes, const Scalar& time);
   Scalar pairEnergy(std::size_t i, std::size_t j, const Scalar& time) const;

@@ -41,20 +41,20 @@ auto Space<Scalar, Layout>::decideCollisions(const Scalar& time) -> std::vector<
 
 /// Bodies that touch and approach where a step begins anew, since nothing has met them on their way.
 template <Real Scalar, class Layout>
-void Space<Scalar, Layout>::decideTouching() {
+auto Space<Scalar, Layout>::decideTouching() -> std::vector<std::pair<BodyId, BodyId>> {
+  std::vector<std::pair<BodyId, BodyId>> merges;
   if (!contact_.collisionHook) {
-    return;
+    return merges;
   }
   const ContactOutcomes<Scalar> starts = decideContacts<Scalar>(
       contacts(), bodies_, contact_.collisionHook, time_,
       std::max<Scalar>(this->config_.restitutionThreshold, this->config_.epsilon), dt_);
   left_.restitution += starts.restitutionLoss;
   left_.friction += starts.frictionLoss;
-  std::vector<std::pair<BodyId, BodyId>> merges;
   for (const auto& [id1, id2] : starts.merges) {
     merges.emplace_back(BodyId{id1}, BodyId{id2});
   }
-  mergeCollided(merges, time_);
+  return merges;
 }
 
 /// One after the other. Of two, the fixed one stays, else the heavier, else the one of the smaller id; a

@@ -49,6 +49,7 @@ std::size_t Space<Scalar, Layout>::moveFewPoints(const Scalar& h, const Scalar* 
     const IntegratorTraits method = traitsOf(this->config_.integrator);
     Compensation<Scalar>* const lost = this->config_.compensatedSummation ? &lost_ : nullptr;
     contact_dt_ = h;
+    forcesValid_ = false;  // if gravity throws
     force_.gravity.setDomain(contact_.domain, time_);
     profiler_.method(Phase::Gravity, force_.gravity.name(n()));
     FewPoints<Scalar> points;
@@ -82,6 +83,7 @@ std::size_t Space<Scalar, Layout>::moveFewPoints(const Scalar& h, const Scalar* 
     contact_.separate(bodies_, this->config_, Scalar(time_ + h), profiler_);
     rememberPlaces();
     resolveCollisions();
+    forcesValid_ = true;
   }
   return more;
 }

@@ -131,13 +131,16 @@ void Space<Scalar, Layout>::prepare() {
   wakeTheChanged();
   contact_.setIdle(false);  // until fallAsleep() has looked at those that came or woke
   while (!forcesValid_ || placesChanged()) {
+    forcesValid_ = false;  // if a hook throws
     applyGravity();
     buildCollisionGraph();
     rememberPlaces();
     hookPower_ = force_.hookPower(bodies_);
     stepGoesOn_ = false;
     updateAdaptiveTimeStep();
-    decideTouching();
+    const std::vector<std::pair<BodyId, BodyId>> merges = decideTouching();
+    forcesValid_ = true;
+    mergeCollided(merges, time_);
   }
   fallAsleep();
 }
@@ -152,7 +155,6 @@ void Space<Scalar, Layout>::rememberPlaces() {
         [&](std::size_t i) { places_[i / detail::tileWidth].take(bodies_, i); },
         [&](std::size_t i) { places_[i / detail::tileWidth].takeOne(bodies_, i); });
   });
-  forcesValid_ = true;
 }
 
 template <Real Scalar, class Layout>

@@ -104,6 +104,7 @@ std::size_t Space<Scalar, Layout>::chooseParts(const Scalar& h) {
 /// One part of a step of length h.
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size_t parts) {
+  forcesValid_ = false;  // if a hook throws
   const bool last = part + 1 == parts;
   const auto share = [&](std::size_t k) {
     return k == 0 ? Scalar(0)
@@ -185,6 +186,7 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
     left_.work -= (hookPower_ + power) * (apart ? contact_dt_ : h) / Scalar(2);
   }
   contact_.endPart(start, last);
+  forcesValid_ = true;
   mergeCollided(merges, Scalar(time_ + end));
   if (!last && !merges.empty()) {
     contact_.endMerged(bodies_, merges);
