@@ -67,7 +67,7 @@ detail::SolvedProblem<S> ContactProblem<S>::solved() const {
   for (std::size_t k = 0; k < rows.size() && watch.holds(); ++k) {
     all.rows.push_back({watch.then()[k], approaches_[k], rows[k].target, S(static_cast<int>(rests_[k]))});
   }
-  all.still = watch.still();
+  all.still = watch.holds() ? watch.still() : S(0);
   all.threshold = threshold_;
   return all;
 }
