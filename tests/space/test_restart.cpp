@@ -135,38 +135,45 @@ TEST_CASE("A heap at rest goes on with the same bits, saved after any of its ste
   }
 }
 
-// Saved in the air. Seen to fail: the file held what had ended the sweeps of the heap before, of which the
-// run that was taken up knows nothing.
-TEST_CASE("Single contacts of two runs in the same state leave the same file, whatever was solved before") {
-  SimulationConfig<double> config = plain(1e-2);
-  config.coeffRestitution = 0;
-  Space<double> whole(config);
-  whole.setUniformField({0, 0, -9.81});
-  whole.addPlane({0, 0, 1}, 0);
-  for (int i = 0; i < 6; ++i) {
-    whole.addBody(ball({0.1 * (i % 2), 0, 0.5 + 0.99 * i}, {0, 0, 0}, 0.5));
+// Saved in the air, and in the end all lie on the floor, alone or but for a stack of two. Seen to fail: the
+// file held what had ended the sweeps of the heap before, and how far bodies had moved when contacts of it
+// were right that had the numbers of single ones now. The run that was taken up knows nothing of these.
+TEST_CASE("Two runs in the same state leave the same file, whatever was solved before") {
+  for (const bool stacked : {false, true}) {
+    SimulationConfig<double> config = plain(1e-2);
+    config.coeffRestitution = 0;
+    Space<double> whole(config);
+    whole.setUniformField({0, 0, -9.81});
+    whole.addPlane({0, 0, 1}, 0);
+    for (int i = 0; i < 6; ++i) {
+      whole.addBody(ball({0.1 * (i % 2), 0, 0.5 + 0.99 * i}, {0, 0, 0}, 0.5));
+    }
+    advance(whole, 30);
+    REQUIRE(whole.contacts().size() > 2);
+    for (std::size_t i = 0; i < 6; ++i) {
+      whole.body(i).position() = Vec(3.0 * static_cast<double>(i), 0, 0.55);
+      whole.body(i).velocity() = Vec(0, 0, 0.2);
+    }
+    if (stacked) {
+      whole.body(5).position() = Vec(0, 0, 1.6);
+    }
+    advance(whole, 2);
+    REQUIRE(whole.contacts().empty());
+    const TemporaryFile middle("air");
+    whole.save(middle.path());
+    Space<double> again;
+    again.restore(middle.path());
+    advance(whole, 60);
+    advance(again, 60);
+    REQUIRE(whole.contacts().size() == 6);
+    const TemporaryFile one("one");
+    const TemporaryFile two("two");
+    whole.save(one.path());
+    again.save(two.path());
+    const bool sameFile = one.bytes() == two.bytes();
+    CAPTURE(stacked);
+    CHECK(sameFile);
   }
-  advance(whole, 30);
-  REQUIRE(whole.contacts().size() > 2);
-  for (std::size_t i = 0; i < 6; ++i) {
-    whole.body(i).position() = Vec(3.0 * static_cast<double>(i), 0, 0.55);
-    whole.body(i).velocity() = Vec(0, 0, 0.2);
-  }
-  advance(whole, 2);
-  REQUIRE(whole.contacts().empty());
-  const TemporaryFile middle("air");
-  whole.save(middle.path());
-  Space<double> again;
-  again.restore(middle.path());
-  advance(whole, 60);
-  advance(again, 60);
-  REQUIRE(whole.contacts().size() == 6);
-  const TemporaryFile one("one");
-  const TemporaryFile two("two");
-  whole.save(one.path());
-  again.save(two.path());
-  const bool sameFile = one.bytes() == two.bytes();
-  CHECK(sameFile);
 }
 
 #ifndef GRAVEL_TEST_SLOW  // see other_spaces.hpp

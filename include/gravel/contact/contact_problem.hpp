@@ -103,7 +103,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
   const detail::ImpulseList<S>& impulses() const { return *impulses_; }
   detail::ImpulseList<S>& impulses() { return *impulses_; }
   /// What the next problem, of the same contacts, goes on from.
-  detail::SolvedProblem<S> solved() const;
+  detail::SolvedProblem<S> solved(const ContactColoring& colouring) const;
   /// Puts it back. \param kinds of the contacts
   template <ContactBodies B>
   void resume(const detail::SolvedProblem<S>& all, const B& source, const ContactColoring& colouring,

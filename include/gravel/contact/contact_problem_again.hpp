@@ -56,7 +56,7 @@ void ContactProblem<S>::keepLast(const ContactColoring& colouring, detail::Impul
 }
 
 template <Real S>
-detail::SolvedProblem<S> ContactProblem<S>::solved() const {
+detail::SolvedProblem<S> ContactProblem<S>::solved(const ContactColoring& colouring) const {
   detail::SolvedProblem<S> all;
   const int back = -speedExponent_;
   for (std::size_t slot = 0; slot + 1 < bodies.size(); ++slot) {
@@ -65,7 +65,8 @@ detail::SolvedProblem<S> ContactProblem<S>::solved() const {
                           watch.holds() ? watch.ways()[slot] : S(0)});
   }
   for (std::size_t k = 0; k < rows.size() && watch.holds(); ++k) {
-    all.rows.push_back({watch.then()[k], approaches_[k], rows[k].target, S(static_cast<int>(rests_[k]))});
+    const S then = k < colouring.loneCount() ? S(0) : watch.then()[k];  // lone rows are not watched
+    all.rows.push_back({then, approaches_[k], rows[k].target, S(static_cast<int>(rests_[k]))});
   }
   all.still = watch.holds() ? watch.still() : S(0);
   all.threshold = threshold_;

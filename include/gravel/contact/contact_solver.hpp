@@ -235,7 +235,7 @@ class ContactSolver {
   }
   const S& memoryStep() const { return memoryStep_; }
   /// What the next solve() goes on from, if it does so.
-  detail::SolvedProblem<S> solved() const { return goesOn_ ? problem_.solved() : detail::SolvedProblem<S>{}; }
+  auto solved() const { return goesOn_ ? problem_.solved(coloring_) : detail::SolvedProblem<S>{}; }
   /// So does the next one after a restart: begin() was given the contacts of that solve, where they stood.
   template <ContactBodies B>
   void resume(const detail::SolvedProblem<S>& solved, const B& bodies) {
