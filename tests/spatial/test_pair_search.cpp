@@ -5,6 +5,8 @@
 #include <gravel/bodies/bodies.hpp>
 #include <gravel/spatial/broad_phase.hpp>
 
+#include <atomic>
+
 using namespace gravel;
 using namespace gravel::test;
 
@@ -32,7 +34,7 @@ IdPairs search(BroadPhaseKind kind, const Cloud<S>& cloud, double margin, const 
 template <class S>
 struct Counting {
   const KDTree<S>& tree;
-  std::size_t& met;
+  std::atomic<std::size_t>& met;  // by all threads
   template <class Visit>
   void forEachWithin(const Vector3<S>& q, S radius, Visit&& visit) const {
     tree.forEachWithin(q, radius, [&](std::size_t i, S distance_sq) {
@@ -229,11 +231,11 @@ TEMPLATE_TEST_CASE("one body far away makes no other one look farther", "", floa
     tree.build(detail::Homes<S>{&spheres});
     std::vector<std::vector<Pair>> parts;
     std::vector<Pair> pairs;
-    std::size_t count = 0;
+    std::atomic<std::size_t> count = 0;
     detail::findPairsByQueries(Counting<S>{tree, count}, spheres, S(0), Domain<S>::open(), S(0), parts,
                                pairs);
     CHECK(named(pairs, cloud) == brutePairs(cloud, S(0), Domain<S>::open(), S(0)));
-    return count;
+    return count.load();
   };
   cloud.positions[0] = Vector3<S>(S(3), S(3), S(3));
   const std::size_t near = met();
