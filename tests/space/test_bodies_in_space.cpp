@@ -3,7 +3,6 @@
 #include "support/temporary_file.hpp"
 #include <gravel/space/space.hpp>
 
-#include <chrono>
 #include <limits>
 
 using namespace gravel;
@@ -621,21 +620,21 @@ TEST_CASE("Bodies whose numbers were spoiled can be removed, one after the other
   CHECK(std::isfinite(space.energyLedger().total()));
 }
 
-// Seen to fail: each removal looked at all others; a thousand of them took as long as several steps.
-TEST_CASE("Without gravity a thousand of many bodies are removed in less than the time of a step") {
-  using Clock = std::chrono::steady_clock;
+// Only a sum over pairs needs the others. Seen to fail: each removal looked at all of them, and booked
+// nothing because of the second.
+TEST_CASE("Without gravity what leaves is booked whatever others' numbers are: they are not looked at") {
   Space<double> space(quiet());
-  for (int k = 0; k < 120000; ++k) {
-    space.addBody(at({3.0 * (k % 50), 3.0 * (k / 50 % 50), 3.0 * (k / 2500)}));
+  for (int k = 0; k < 3; ++k) {
+    space.addBody(at({3.0 * k, 0, 0}));
   }
+  space.body(0).velocity() = Vector3<double>(2, 0, 0);
   space.computeDynamics(0);
-  const auto start = Clock::now();
-  space.computeDynamics(1);
-  const auto stepped = Clock::now();
-  for (std::uint64_t k = 0; k < 1000; ++k) {
-    space.removeBody(BodyId{k});
-  }
-  CHECK(Clock::now() - stepped < stepped - start);
+  const double before = space.energyLedger().total();
+  CHECK(before > 1);
+  space.body(1).position()[0] = std::numeric_limits<double>::quiet_NaN();
+  space.removeBody(BodyId{0});
+  space.removeBody(BodyId{1});
+  CHECK(space.energyLedger().total() == before);
 }
 
 // Seen to fail: what contacts had done to its velocity in the step before was taken for support (it left

@@ -31,15 +31,16 @@ struct ContactSettings {
   bool accelerate = true;   ///< momentum between sweeps; off: plain Gauss-Seidel
 };
 
-/// As many sweeps as look at so many contacts, from 20 to 1000.
-inline int sweepsOfLooks(std::size_t looks, std::size_t contacts) {
+/// As many sweeps over these contacts as make so many looks, from 20 to 1000: where contacts are few (below
+/// 200 of them, unless more looks are asked for) sweeps are cheap, and pass on what 20 would not.
+inline int sweepsOfLooks(std::size_t contacts, std::size_t looks = 4000) {
   return static_cast<int>(std::clamp<std::size_t>(looks / std::max<std::size_t>(contacts, 1), 20, 1000));
 }
 
-/// How far a solve goes where nobody says how many sweeps it may take (`most` is 0): 20, and where contacts
-/// are few as many as look at 4000, up to 1000. If no impulse is remembered, as in a structure that was just
-/// put up, as many as look at a million, and to a hundredth of the tolerance: what slips while forces are
-/// being found may never come to rest again. What it costs stands in docs/theory-contact.md.
+/// How far a solve goes, where nobody says how many sweeps it may take (`most` is 0) by sweepsOfLooks(). If
+/// no impulse is remembered, as in a structure that was just put up, by a million looks, and to a hundredth
+/// of the tolerance: what slips while forces are being found may never come to rest again. What it costs
+/// stands in docs/theory-contact.md.
 template <Real S>
 void limitSweeps(ContactSettings<S>& settings, std::size_t most, std::size_t contacts, bool remembers) {
   if (most == 0 && !remembers) {
@@ -47,8 +48,9 @@ void limitSweeps(ContactSettings<S>& settings, std::size_t most, std::size_t con
     settings.tolerance = std::max<S>(S(0.01) * settings.tolerance, least);
   }
   settings.maxIterations =
-      most == 0 ? sweepsOfLooks(remembers ? 4000 : 1'000'000, contacts)
-                : static_cast<int>(std::min<std::size_t>(most, std::numeric_limits<int>::max()));
+      most > 0    ? static_cast<int>(std::min<std::size_t>(most, std::numeric_limits<int>::max()))
+      : remembers ? sweepsOfLooks(contacts)
+                  : sweepsOfLooks(contacts, 1'000'000);
 }
 
 /// Where bodies go after a solve. Contacts are right at the end of the way that follows, as pairs turn on it

@@ -6,6 +6,7 @@
 #include <gravel/contact/contact.hpp>
 #include <gravel/contact/impact_past.hpp>
 #include <gravel/contact/impact_scene.hpp>
+#include <gravel/contact/resting_gap.hpp>
 #include <gravel/contact/swept_spheres.hpp>
 #include <gravel/core/memory.hpp>
 #include <gravel/core/parallel.hpp>
@@ -260,7 +261,7 @@ class ImpactForecast : protected ImpactPast<S> {
         const RelativeFlight<S> flight = flightOf(scene, i, j, drift);
         const Vector3<S> r = flight.place(from);
         const S reach = S(scene.bodies.radii()[i]) + S(scene.bodies.radii()[j]);
-        if (!(detail::safeNorm(r) <= reach + reach / S(1000))) {
+        if (!(detail::safeNorm(r) <= reach * (S(1) + detail::restingMargin<S>()))) {
           continue;  // moved apart by overlaps with others: it bears nothing, and is not in every list
         }
         const Vector3<S> n = detail::safeUnit(r);

@@ -122,8 +122,7 @@ struct ImpactMeeting {
   S distance = S(0);  ///< [m] of the centres; to a boundary the radius
   S a_n = S(0);       ///< [m s^-2] of the second relative to the first, along n
   Vector3<S> drift;   ///< [m s^-1] of the second besides its own velocity: of an image, of a boundary
-  S lead =
-      S(0);  ///< [m s^-1] of a boundary's velocity now before its mean over the drift, along which it goes
+  S lead = S(0);      ///< [m s^-1] of the drift now, before its mean, along which a boundary goes
   Material<S> material;
 };
 

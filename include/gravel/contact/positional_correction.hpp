@@ -15,8 +15,7 @@
 
 namespace gravel {
 
-/// How overlap is removed. A `Space` takes a factor of its own, 0.4 by default, and more sweeps where
-/// contacts are few: 4000 over their number, up to 1000.
+/// How overlap is removed. A `Space` takes a factor of its own, 0.4 by default, and sweepsOfLooks().
 template <Real Scalar>
 struct CorrectionSettings {
   Scalar factor = Scalar(0.8);  ///< [1], 0 … 1: part of each overlap to remove

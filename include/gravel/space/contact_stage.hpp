@@ -102,7 +102,7 @@ class ContactStage {
     const Profiler::Scope scope(profiler, Phase::PositionalCorrection);
     const CorrectionSettings<Scalar> settings{
         .factor = config.positionalCorrectionFactor,
-        .maxIterations = sweepsOfLooks(4000, contacts_.size()),
+        .maxIterations = sweepsOfLooks(contacts_.size()),
         .keepAngularMomentum = domain.isOpen()};  // images have none to keep
     separationLoss_ = solver_.correctPositions(bodies, settings).loss;
     moved_ = !solver_.displacements().empty();
