@@ -113,7 +113,10 @@ void addEnergy(std::string& text, const History& h) {
     text += format("Pushing overlaps apart %s %.1e of the energy in play.\n",
                    h.last.correction < 0.0 ? "put in" : "took", std::abs(h.last.correction) / h.inPlay);
   }
-  if (h.peakMotion > 0.0) {
+  if (h.peakMotion < 1e-9 * h.inPlay) {
+    text += format("Nothing moved to speak of: the most kinetic energy seen is %.1e of the energy in play.\n",
+                   h.peakMotion / h.inPlay);
+  } else if (h.peakMotion > 0.0) {
     const double left = motion / h.peakMotion;
     text += format(left < 1e-4 ? "All has come to rest: %.1e of the most kinetic energy seen is left.\n"
                                : "%.2g of the most kinetic energy seen is left.\n",
