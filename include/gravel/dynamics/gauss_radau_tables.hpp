@@ -25,6 +25,9 @@ struct RadauTables {
       0.547153626330555383001448554766,  0.734210177215410531523210605558, 0.885320946839095768090359771030,
       0.977520613561287501891174488626};
 
+  /// h_n, to the last bit of node[n].
+  static constexpr long double h(std::size_t n) { return static_cast<long double>(node[n]); }
+
   std::array<Row, nodes + 1> position{};  ///< [n][m]: integral of (h_n - s) l_m(s) over [0, h_n]; last: to 1
   std::array<Row, nodes + 1> velocity{};  ///< [n][m]: integral of l_m(s) over [0, h_n]; last: to 1
   std::array<Row, nodes> power{};         ///< [j][m]: coefficient of s^(j+1) in l_m
@@ -35,7 +38,7 @@ struct RadauTables {
   constexpr RadauTables() {
     for (std::size_t m = 0; m < nodes; ++m) {
       for (std::size_t n = 0; n <= nodes; ++n) {
-        const long double end = n < nodes ? static_cast<long double>(node[n]) : 1.0L;
+        const long double end = n < nodes ? h(n) : 1.0L;
         for (std::size_t g = 0; g < 5; ++g) {  // Gauss-Legendre, exact to degree 9
           const long double s = end * (1 + gaussNode(g)) / 2;
           const long double w = end * gaussWeight(g) / 2 * lagrange(m, s);
@@ -45,14 +48,14 @@ struct RadauTables {
       }
       // s/h_m times the product over k of (s - h_k)/(h_m - h_k), multiplied out.
       std::array<long double, nodes> c{};
-      c[0] = 1 / static_cast<long double>(node[m]);
+      c[0] = 1 / h(m);
       std::size_t degree = 0;
       for (std::size_t k = 0; k < nodes; ++k) {
         if (k != m) {
-          const long double scale = 1 / (static_cast<long double>(node[m]) - node[k]);
+          const long double scale = 1 / (h(m) - h(k));
           ++degree;
           for (std::size_t j = degree + 1; j-- > 0;) {
-            c[j] = ((j > 0 ? c[j - 1] : 0) - (j < degree ? c[j] * node[k] : 0)) * scale;
+            c[j] = ((j > 0 ? c[j - 1] : 0) - (j < degree ? c[j] * h(k) : 0)) * scale;
           }
         }
       }
@@ -68,10 +71,10 @@ struct RadauTables {
 
  private:
   static constexpr long double lagrange(std::size_t m, long double s) {
-    long double l = s / node[m];
+    long double l = s / h(m);
     for (std::size_t k = 0; k < nodes; ++k) {
       if (k != m) {
-        l *= (s - node[k]) / (static_cast<long double>(node[m]) - node[k]);
+        l *= (s - h(k)) / (h(m) - h(k));
       }
     }
     return l;

@@ -67,8 +67,8 @@ struct RowTerms {
   using D = HarmonicTerms::Derivatives;
   static constexpr int count = M::size(P - N) - (P > N && !Dipole ? 3 : 0);
 
-  std::array<short, count> moment{};
-  std::array<short, count> derivative{};
+  std::array<short, std::size_t{count}> moment{};
+  std::array<short, std::size_t{count}> derivative{};
 
   constexpr RowTerms() {
     std::size_t term = 0;
@@ -95,19 +95,19 @@ struct UnrolledExpansion {
     if (first == 0) {
       contractTo<false, 0, 0, 0>(moments, derivatives, locals);
     }
-    contractAll(moments, derivatives, locals, std::make_index_sequence<P>());
+    contractAll(moments, derivatives, locals, std::make_index_sequence<std::size_t{P}>());
   }
 
   /// Derivatives of f = 1/r, given that and q = -1/r^2.
   static void derivatives(const V& x, const V& y, const V& z, const V& q, const V& f, V* d) {
     d[0] = f;
-    derivativesAll({q * x, q * y, q * z, q}, d, std::make_index_sequence<P>());
+    derivativesAll({q * x, q * y, q * z, q}, d, std::make_index_sequence<std::size_t{P}>());
   }
 
   /// q[k] = Q_k(x, y, z).
   static void regular(const V& x, const V& y, const V& z, V* q) {
     q[0] = x - x + 1.0;
-    regularAll(x, y, z, q, std::make_index_sequence<P>());
+    regularAll(x, y, z, q, std::make_index_sequence<std::size_t{P}>());
   }
 
   /// field += a local expansion and its first derivatives, or, with `first` 1, these alone.
@@ -132,11 +132,11 @@ struct UnrolledExpansion {
     constexpr int results = std::min(4, N - C - B + 1);
     if constexpr (results > 0) {
       static constexpr RowTerms<P, N, C, Dipole> terms{};
-      V sums[results];
+      V sums[std::size_t{results}];
       V* to = out + M::row(N, C) + B;
       std::copy_n(to, results, sums);
-      addTerms(sums, terms, m, d + B, std::make_index_sequence<results>(),
-               std::make_index_sequence<terms.count>());
+      addTerms(sums, terms, m, d + B, std::make_index_sequence<std::size_t{results}>(),
+               std::make_index_sequence<std::size_t{terms.count}>());
       std::copy_n(sums, results, to);
       contractTo<Dipole, N, C, B + results>(m, d, out);
     }
@@ -279,7 +279,7 @@ struct FarOperators {
   template <int Last, class Call>
   static bool unrolled(int order, Call&& call) {
     if constexpr (Terms::harmonic && std::is_same_v<V, NativeDoubles>) {
-      return choose(order, call, std::make_index_sequence<Last>());
+      return choose(order, call, std::make_index_sequence<std::size_t{Last}>());
     } else {
       return false;
     }

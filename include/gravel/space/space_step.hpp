@@ -166,8 +166,8 @@ bool Space<Scalar, Layout>::placesChanged() const {
     std::size_t count = 0;
     detail::forTilesOrBodies(
         bodies_.storage(), begin, end,
-        [&](std::size_t i) { count += places_[i / detail::tileWidth].holds(bodies_, i, end) ? 0 : 1; },
-        [&](std::size_t i) { count += places_[i / detail::tileWidth].holdsOne(bodies_, i) ? 0 : 1; });
+        [&](std::size_t i) { count += places_[i / detail::tileWidth].holds(bodies_, i, end) ? 0U : 1U; },
+        [&](std::size_t i) { count += places_[i / detail::tileWidth].holdsOne(bodies_, i) ? 0U : 1U; });
     return count;
   });
   return moved > 0;
