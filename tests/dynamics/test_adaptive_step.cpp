@@ -6,6 +6,8 @@
 using namespace gravel;
 using namespace gravel::test;
 
+namespace test_adaptive_step {
+
 namespace {
 
 using Vec = Vector3<double>;
@@ -114,3 +116,5 @@ TEST_CASE("A point at rest in a field asks for no step of zero") {
   CHECK(stepFromMotion(bodies, 0.0, wide) == wide.largest);
   CHECK(stepFromMotion(bodies, 0.0, wide, true) == wide.largest);
 }
+
+}  // namespace test_adaptive_step

@@ -7,6 +7,8 @@
 using namespace gravel;
 using namespace gravel::test;
 
+namespace test_encounter_step {
+
 namespace {
 
 using Vec = Vector3<double>;
@@ -234,3 +236,5 @@ TEST_CASE("Fixed bodies ask for no step of each other, and all the same of what 
   // A second star doubles the rate of each pair's square, two equal rates the eighth powers' sum.
   CHECK_THAT(scene(true, true), WithinRel(scene(false, true) / std::pow(2.0, 0.125), 1e-3));
 }
+
+}  // namespace test_encounter_step

@@ -10,6 +10,8 @@
 using namespace gravel;
 using namespace gravel::test;
 
+namespace test_hermite {
+
 namespace {
 
 using Real80 = long double;
@@ -426,3 +428,5 @@ TEST_CASE("The bounds of steps by pairs cost a cluster little") {
   CHECK(rows >= steps);
   CHECK(static_cast<double>(rows - steps) < 0.2 * static_cast<double>(steps));
 }
+
+}  // namespace test_hermite

@@ -8,6 +8,8 @@
 using namespace gravel;
 using namespace gravel::test;
 
+namespace test_fast_multipole {
+
 namespace {
 
 using Wide = Vector3<long double>;
@@ -398,3 +400,5 @@ TEST_CASE("expansions refuse values that make no force by name") {
   CHECK_THROWS_WITH(sum.setTolerance(0.0), ContainsSubstring("gravity tolerance is 0"));
   CHECK(sum.tolerance() == 1e-5);
 }
+
+}  // namespace test_fast_multipole

@@ -6,6 +6,8 @@
 using namespace gravel;
 using namespace gravel::test;
 
+namespace test_bounce {
+
 namespace {
 
 constexpr double g = 9.81;
@@ -279,3 +281,5 @@ TEST_CASE("An elastic ball that a spring throws at the floor keeps its energy, a
     CHECK_THAT(energy(), WithinRel(start, 20 * h * h));
   }
 }
+
+}  // namespace test_bounce

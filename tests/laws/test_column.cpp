@@ -4,6 +4,8 @@
 using namespace gravel;
 using namespace gravel::test;
 
+namespace test_column {
+
 namespace {
 
 constexpr double g = 9.81;
@@ -164,3 +166,5 @@ TEST_CASE("A cradle with small gaps passes the whole momentum to its last ball")
   }
   CHECK_THAT(space.body(4).velocity()[0], WithinAbs(1.0, 1e-15));
 }
+
+}  // namespace test_column

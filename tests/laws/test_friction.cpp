@@ -4,6 +4,8 @@
 using namespace gravel;
 using namespace gravel::test;
 
+namespace test_friction {
+
 namespace {
 
 constexpr double g = 9.81;
@@ -152,3 +154,5 @@ TEST_CASE("A pair that turns as one parts exactly above the frequency sqrt(G m /
     CHECK((std::abs(gap) < 2 * 1e-6 / (8 * std::abs(1 - factor)) + 4e-6) == (factor < 1));
   }
 }
+
+}  // namespace test_friction

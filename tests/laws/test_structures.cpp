@@ -13,6 +13,8 @@
 using namespace gravel;
 using namespace gravel::test;
 
+namespace test_structures {
+
 namespace {
 
 constexpr double g = 9.81;
@@ -171,3 +173,5 @@ TEST_CASE("Larger pyramids stand by the default settings where they do so when a
 TEST_CASE("Four balls in a tetrahedron do not creep by the default settings") {
   CHECK(moves(tetrahedron(2), 1.0 / 60, 1, 0.5, 0.5, false, 18'000)[1] < 1e-4);
 }
+
+}  // namespace test_structures

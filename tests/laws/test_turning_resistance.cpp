@@ -6,6 +6,8 @@
 using namespace gravel;
 using namespace gravel::test;
 
+namespace test_turning_resistance {
+
 namespace {
 
 constexpr double g = 9.81;
@@ -116,3 +118,5 @@ TEST_CASE("In one blow the resistance is bound by its coefficient and takes the 
     }
   }
 }
+
+}  // namespace test_turning_resistance

@@ -8,6 +8,8 @@
 using namespace gravel;
 using namespace gravel::test;
 
+namespace test_bodies_in_space {
+
 namespace {
 
 using Vec = Vector3<double>;
@@ -678,3 +680,5 @@ TEST_CASE("Another domain has other contacts at once") {
     CHECK_THAT(space.body(1).velocity()[0], WithinAbs(1.0, 1e-15));
   }
 }
+
+}  // namespace test_bodies_in_space

@@ -10,6 +10,8 @@
 using namespace gravel;
 using namespace gravel::test;
 
+namespace test_boundaries {
+
 namespace {
 
 const double g = 9.81;
@@ -541,3 +543,5 @@ TEST_CASE("Walls far away change no bit, at rest or moving") {
   };
   CHECK(sameBits(run(false), run(true)));
 }
+
+}  // namespace test_boundaries

@@ -7,6 +7,8 @@
 using namespace gravel;
 using namespace gravel::test;
 
+namespace test_few_points {
+
 namespace {
 
 constexpr double step = 1.0 / 1024;  // sums of steps are exact
@@ -163,3 +165,5 @@ TEST_CASE("A run of a few points stops where a number is none, and is left at th
   CHECK_THROWS_WITH(space.advanceTo(20 * step), ContainsSubstring("body 1"));
   CHECK(sameBits(stateOf(space), before));
 }
+
+}  // namespace test_few_points

@@ -9,6 +9,8 @@
 using namespace gravel;
 using namespace gravel::test;
 
+namespace test_gravity_of_images {
+
 namespace {
 
 const Vec box(2, 3, 2.5);
@@ -198,3 +200,5 @@ TEST_CASE("Bodies of a box that merge keep momentum, and the ledger closes") {
   CHECK(std::abs(space.energyLedger().exchange) > 1e-3);
   CHECK_THAT(space.energyLedger().total(), WithinAbs(before, 1e-4));
 }
+
+}  // namespace test_gravity_of_images

@@ -9,6 +9,8 @@
 using namespace gravel;
 using namespace gravel::test;
 
+namespace test_shearing_patch {
+
 namespace {
 
 const double omega = 1.0;
@@ -433,3 +435,5 @@ TEST_CASE("A clump with friction keeps its shape in the tide") {
     CHECK_THAT(r.norm() / 2, WithinAbs(1.0, 2e-3));
   }
 }
+
+}  // namespace test_shearing_patch

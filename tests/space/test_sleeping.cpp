@@ -8,6 +8,8 @@
 using namespace gravel;
 using namespace gravel::test;
 
+namespace test_sleeping {
+
 namespace {
 
 constexpr double g = 9.81;
@@ -498,3 +500,5 @@ TEST_CASE("Sleep is refused where nothing rests or touches") {
                                              ContainsSubstring(traitsOf(kind).name));
   }
 }
+
+}  // namespace test_sleeping
