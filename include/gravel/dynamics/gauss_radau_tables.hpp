@@ -25,9 +25,6 @@ struct RadauTables {
       0.547153626330555383001448554766,  0.734210177215410531523210605558, 0.885320946839095768090359771030,
       0.977520613561287501891174488626};
 
-  /// h_n, to the last bit of node[n].
-  static constexpr long double h(std::size_t n) { return static_cast<long double>(node[n]); }
-
   std::array<Row, nodes + 1> position{};  ///< [n][m]: integral of (h_n - s) l_m(s) over [0, h_n]; last: to 1
   std::array<Row, nodes + 1> velocity{};  ///< [n][m]: integral of l_m(s) over [0, h_n]; last: to 1
   std::array<Row, nodes> power{};         ///< [j][m]: coefficient of s^(j+1) in l_m
@@ -70,6 +67,7 @@ struct RadauTables {
   }
 
  private:
+  static constexpr long double h(std::size_t n) { return static_cast<long double>(node[n]); }
   static constexpr long double lagrange(std::size_t m, long double s) {
     long double l = s / h(m);
     for (std::size_t k = 0; k < nodes; ++k) {
