@@ -13,26 +13,24 @@
 
 #include <algorithm>
 #include <array>
-#include <numeric>
 
 namespace gravel {
 
 /// Books the energy of a solved problem. Newton's law of restitution makes energy in some multiple blows with
 /// friction (Kane's paradox) and a residual may do so in any; an island of contacts that gained gets all its
 /// impulses multiplied by the beta < 1 at which it gains nothing. That keeps momentum, angular momentum and
-/// Coulomb's cone. Islands are joined by contacts whether these push or not: so they stay while the contacts
-/// do, though in a heap at rest some always come to push and others cease.
+/// Coulomb's cone.
 template <Real S>
 class ContactEnergy {
  public:
   /// Guards the energy of `problem`, fills in the losses of the report, and completes the list of its
   /// impulses, in SI units. O(contacts). \param others the rows are not those of the last call
   void book(ContactProblem<S>& problem, const ContactColoring& colouring, const ContactView<S>& contacts,
-            bool others, ContactReport<S>& report) {
+            const detail::SolverIslands& islands, bool others, ContactReport<S>& report) {
     detail::resizeAnew(terms_, problem.rows.size());
     known_ = known_ && !others;
     Sums sums = takeDown(problem, colouring, contacts);
-    if (sums[3] > S(0) && guard(problem, colouring, contacts)) {
+    if (sums[3] > S(0) && guard(problem, colouring, contacts, islands)) {
       sums = takeDown(problem, colouring, contacts);
     }
     if (problem.isScaled()) {
@@ -176,12 +174,13 @@ class ContactEnergy {
 
   /// Islands: movable bodies joined by contacts. dT of an island is beta a + beta^2 b under a common factor
   /// beta, a = sum J.u^- and b = sum J.(u^+ - u^-)/2 >= 0: zero at beta = -a/b.
-  bool guard(ContactProblem<S>& problem, const ContactColoring& colouring, const ContactView<S>& contacts) {
+  bool guard(ContactProblem<S>& problem, const ContactColoring& colouring, const ContactView<S>& contacts,
+             const detail::SolverIslands& islands) {
     if (!known_) {
-      findIslands(colouring);
+      nameIslands(colouring, islands);
       known_ = true;
     }
-    findGains(colouring);
+    findGains(colouring, islands.size());
     const bool any =
         std::any_of(gains_.begin(), gains_.end(), [](const Gain& gain) { return gain.isReal(); });
     if (any) {
@@ -207,13 +206,13 @@ class ContactEnergy {
           island.beta = a < S(0) && b > S(0) ? std::min<S>(S(1), S(-a / b)) : S(0);
         }
       }
-      shrink(problem, colouring);
+      shrink(problem, colouring, islands);
     }
     return any;
   }
 
   /// Most rows that follow each other are of one island: each run of them is summed by itself.
-  void findGains(const ContactColoring& colouring) {
+  void findGains(const ContactColoring& colouring, std::size_t islands) {
     const std::size_t piece = std::max<std::size_t>(16, colouring.partsOfTask());
     const std::size_t pieces = (colouring.parts().size() + piece - 1) / piece;
     runs_.resize(std::max(runs_.size(), pieces));
@@ -231,7 +230,7 @@ class ContactEnergy {
         }
       }
     });
-    gains_.assign(islandOfSlot_.size(), Gain{});
+    gains_.assign(islands, Gain{});
     for (std::size_t p = 0; p < pieces; ++p) {
       for (const Run& run : runs_[p]) {
         gains_[run.island].sum += run.gain.sum;
@@ -240,27 +239,18 @@ class ContactEnergy {
     }
   }
 
-  void findIslands(const ContactColoring& colouring) {
-    islandOfSlot_.resize(colouring.bodies().size() + 1);
-    std::iota(islandOfSlot_.begin(), islandOfSlot_.end(), 0U);
-    for (const ContactColoring::Row& row : colouring.rowsByContact()) {  // neighbours in memory too
-      if (colouring.movable(row.slot1) && colouring.movable(row.slot2)) {
-        join(row.slot1, row.slot2);
-      }
-    }
-    for (std::uint32_t& parent : islandOfSlot_) {  // a parent comes before its children
-      parent = islandOfSlot_[parent];
-    }
+  void nameIslands(const ContactColoring& colouring, const detail::SolverIslands& islands) {
     detail::resizeAnew(islandOfRow_, colouring.rows().size());
     detail::forAllParts(colouring, [&](std::size_t begin, std::size_t end) {
       for (std::size_t k = begin; k < end; ++k) {
         const ContactColoring::Row& row = colouring.rows()[k];
-        islandOfRow_[k] = islandOfSlot_[colouring.movable(row.slot1) ? row.slot1 : row.slot2];
+        islandOfRow_[k] = islands.of(colouring.movable(row.slot1) ? row.slot1 : row.slot2);
       }
     });
   }
 
-  void shrink(ContactProblem<S>& problem, const ContactColoring& colouring) {
+  void shrink(ContactProblem<S>& problem, const ContactColoring& colouring,
+              const detail::SolverIslands& islands) {
     for (std::size_t k = 0; k < problem.rows.size(); ++k) {
       const S beta = islands_[islandOfRow_[k]].beta;
       if (beta < S(1)) {
@@ -271,7 +261,7 @@ class ContactEnergy {
       }
     }
     for (std::uint32_t slot = 0; slot < colouring.bodies().size(); ++slot) {
-      const S beta = islands_[islandOfSlot_[slot]].beta;
+      const S beta = islands_[islands.of(slot)].beta;
       if (beta < S(1) && colouring.movable(slot)) {
         Body& b = problem.bodies[slot];
         const auto& b0 = problem.initial[slot];
@@ -281,27 +271,8 @@ class ContactEnergy {
     }
   }
 
-  std::uint32_t rootOf(std::uint32_t i) {
-    while (islandOfSlot_[i] != i) {
-      islandOfSlot_[i] = islandOfSlot_[islandOfSlot_[i]];
-      i = islandOfSlot_[i];
-    }
-    return i;
-  }
-
-  void join(std::uint32_t i, std::uint32_t j) {
-    if (islandOfSlot_[i] == islandOfSlot_[j]) {
-      return;
-    }
-    i = rootOf(i);
-    j = rootOf(j);
-    islandOfSlot_[std::max(i, j)] =
-        std::min(i, j);  // slots are numbered by ids: the same whatever the indices
-  }
-
   std::vector<S> terms_;  ///< J.(u^- + u^+)/2 by row
-  bool known_ = false;    ///< the islands are of these rows
-  std::vector<std::uint32_t> islandOfSlot_;
+  bool known_ = false;    ///< islandOfRow_ is of these rows
   std::vector<std::uint32_t> islandOfRow_;
   std::vector<std::vector<Run>> runs_;  ///< of rows
   std::vector<Gain> gains_;             ///< by the slot that stands for the island

@@ -64,10 +64,10 @@ class ContactProblem : public detail::ProblemBodies<S> {
   ///        does to velocities what that did, `ratio` times, so that no contact needs to be asked; bodies
   ///        whose masses have changed are guarded against
   template <ContactBodies B>
-  void gather(const ContactView<S>& contacts, const B& source, const ContactColoring& colouring, const S& dt,
-              const ContactSettings<S>& settings, const ContactKinds& kinds, detail::ImpulseList<S>& impulses,
-              const detail::ImpulseList<S>& last, const S& ratio, bool fresh, bool goesOn,
-              const WayAhead<S>& way);
+  void gather(const ContactView<S>& contacts, const B& source, const ContactColoring& colouring,
+              const detail::SolverIslands& islands, const S& dt, const ContactSettings<S>& settings,
+              const ContactKinds& kinds, detail::ImpulseList<S>& impulses, const detail::ImpulseList<S>& last,
+              const S& ratio, bool fresh, bool goesOn, const WayAhead<S>& way);
 
   /// Calls f(group) for rows [begin, end), which share no movable body; brings what later ones need nearer.
   template <class F>
@@ -107,7 +107,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
   /// Puts it back. \param kinds of the contacts
   template <ContactBodies B>
   void resume(const detail::SolvedProblem<S>& all, const B& source, const ContactColoring& colouring,
-              const ContactKinds& kinds);
+              const detail::SolverIslands& islands, const ContactKinds& kinds);
 
   /// Rows with their impulses. \param all  none of them was passed over
   [[gnu::always_inline]] inline Lanes load(const Group& group, bool all) const {

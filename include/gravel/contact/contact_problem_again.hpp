@@ -76,11 +76,12 @@ detail::SolvedProblem<S> ContactProblem<S>::solved(const ContactColoring& colour
 template <Real S>
 template <ContactBodies B>
 void ContactProblem<S>::resume(const detail::SolvedProblem<S>& all, const B& source,
-                               const ContactColoring& colouring, const ContactKinds& kinds) {
+                               const ContactColoring& colouring, const detail::SolverIslands& islands,
+                               const ContactKinds& kinds) {
   friction = kinds.rub || kinds.turn;
   again = false;
   this->bend_ = {};
-  gatherBodies(source, colouring, S(0));
+  gatherBodies(source, colouring, islands, S(0));
   std::vector<S> ways(bodies.size(), S(0));
   for (std::size_t slot = 0; slot < all.bodies.size(); ++slot) {
     initial[slot].v = speedIn(all.bodies[slot].v0);

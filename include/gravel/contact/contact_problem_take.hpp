@@ -11,8 +11,8 @@ namespace gravel {
 template <Real S>
 template <ContactBodies B>
 void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
-                               const ContactColoring& colouring, const S& dt,
-                               const ContactSettings<S>& settings, const ContactKinds& kinds,
+                               const ContactColoring& colouring, const detail::SolverIslands& islands,
+                               const S& dt, const ContactSettings<S>& settings, const ContactKinds& kinds,
                                detail::ImpulseList<S>& impulses, const detail::ImpulseList<S>& last,
                                const S& ratio, bool fresh, bool goesOn, const WayAhead<S>& way) {
   friction = kinds.rub || kinds.turn;
@@ -21,7 +21,7 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   drifting = kinds.drift;
   again = goesOn;
   this->bend_ = way.bend;
-  gatherBodies(source, colouring, ratio);
+  gatherBodies(source, colouring, islands, ratio);
   fresh = fresh || !sameScales_ || rows.size() != contacts.size();
   impulses_ = &impulses;
   last_ = &last;

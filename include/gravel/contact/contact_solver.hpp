@@ -14,17 +14,6 @@ namespace gravel {
 
 enum class ContactSolverKind { SequentialImpulses };
 
-/// What is remembered of a contact from step to step.
-template <Real Scalar>
-struct StoredImpulse {
-  std::uint64_t key1;
-  std::uint64_t key2;
-  ContactImpulse<Scalar> impulse;
-
-  ContactKeys keys() const { return {key1, key2}; }
-  friend bool operator==(const StoredImpulse&, const StoredImpulse&) = default;
-};
-
 /// Contacts in, velocities out. Keeps its workspace and the last step's impulses.
 /// Determinism: all of it is a function of the contacts in the order of their keys; neither indices nor
 /// threads change a bit.
@@ -75,6 +64,7 @@ class ContactSolver {
         before_.findEnded(contacts.contacts, problem_.rows, bodies, ended_);
       }
       coloring_.build(contacts.contacts, bodies);
+      islands_.find(coloring_);
       before_.handOn(contacts.contacts, coloring_.rows(), names_, rowImpulses_);
       handedOn_ = true;
       otherRows_ = true;
@@ -110,8 +100,8 @@ class ContactSolver {
       // Forces that last give impulses in proportion of the steps.
       const S ratio = settings_.warmStart && memoryStep_ > S(0) ? S(dt / memoryStep_) : S(0);
       rowImpulses_.resize(contacts.size(), facts_.kinds.turn);
-      problem_.gather(contacts, bodies, coloring_, dt, settings_, facts_.kinds, rowImpulses_, *last, ratio,
-                      fresh_, goesOn && ratio > S(0), way);
+      problem_.gather(contacts, bodies, coloring_, islands_, dt, settings_, facts_.kinds, rowImpulses_, *last,
+                      ratio, fresh_, goesOn && ratio > S(0), way);
       fresh_ = false;
       if (problem_.active) {
         report = std::visit([&](auto& algorithm) { return algorithm.solve(problem_, coloring_, settings_); },
@@ -120,7 +110,7 @@ class ContactSolver {
         if (kept_) {
           problem_.keepLast(coloring_, before_.impulses());
         }
-        energy_.book(problem_, coloring_, contacts, otherRows_, report);
+        energy_.book(problem_, coloring_, contacts, islands_, otherRows_, report);
         otherRows_ = false;
         problem_.scatter(bodies, coloring_);
         goesOn_ = true;
@@ -201,6 +191,11 @@ class ContactSolver {
     return goesOn_ ? problem_.changeOf(coloring_.slotOf(body)) : Vector3<S>(Vector3<S>::Zero());
   }
 
+  /// Whether a body has contacts of begin().
+  bool knows(std::uint32_t body) const { return coloring_.slotOf(body) != coloring_.staticSlot(); }
+  /// Against what [m s^-2] these hold it, at the last solve(); 0 of what they do not move.
+  const S& fallOf(std::uint32_t body) const { return problem_.fallOf(coloring_.slotOf(body)); }
+
   /// Those of the solve before the last begin() that it was not given any more, in the order of their keys.
   const std::vector<detail::EndedContact<S>>& ended() const { return ended_; }
   /// Of the solve before the last one, whose contacts may have been others, in the order of their keys.
@@ -241,7 +236,7 @@ class ContactSolver {
   void resume(const detail::SolvedProblem<S>& solved, const B& bodies) {
     if (solved.bodies.size() == coloring_.bodies().size() && !solved.bodies.empty() &&
         (solved.rows.size() == coloring_.rows().size() || solved.rows.empty())) {
-      problem_.resume(solved, bodies, coloring_, facts_.kinds);
+      problem_.resume(solved, bodies, coloring_, islands_, facts_.kinds);
       goesOn_ = true;
     }
   }
@@ -292,7 +287,8 @@ class ContactSolver {
   std::variant<SequentialImpulses<S>> algorithm_;
   ContactSettings<S> settings_;
   ContactColoring coloring_;
-  ContactFacts<S> facts_;  ///< of the contacts of begin()
+  detail::SolverIslands islands_;  ///< of coloring_
+  ContactFacts<S> facts_;          ///< of the contacts of begin()
   ContactProblem<S> problem_;
   ContactEnergy<S> energy_;
   PositionalCorrection<S> correction_;

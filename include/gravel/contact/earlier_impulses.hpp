@@ -12,7 +12,20 @@
 #include <utility>
 #include <vector>
 
-namespace gravel::detail {
+namespace gravel {
+
+/// What is remembered of a contact from step to step.
+template <Real Scalar>
+struct StoredImpulse {
+  std::uint64_t key1;
+  std::uint64_t key2;
+  ContactImpulse<Scalar> impulse;
+
+  ContactKeys keys() const { return {key1, key2}; }
+  friend bool operator==(const StoredImpulse&, const StoredImpulse&) = default;
+};
+
+namespace detail {
 
 /// By contact, its row.
 inline void findRows(std::span<const ContactColoring::Row> rows, std::vector<std::uint32_t>& rowOf) {
@@ -117,4 +130,6 @@ class EarlierImpulses {
   std::vector<std::uint32_t> origins_;  ///< by a contact that is handed on to: its row here, or staticPartner
 };
 
-}  // namespace gravel::detail
+}  // namespace detail
+
+}  // namespace gravel

@@ -290,9 +290,7 @@ class ImpactForecast : protected ImpactPast<S> {
       return k != staticPartner && isMovable(scene.bodies, k) &&
              history_[k].impacts >= scene.settings.mostSlow;
     };
-    const S fall = isOften(i) && isOften(j)
-                       ? S(safeNorm(scene.freeAcceleration(i)) + safeNorm(scene.freeAcceleration(j)))
-                       : scene.heldAlong(i, j, n);
+    const S fall = isOften(i) && isOften(j) ? S(scene.fallOf(i) + scene.fallOf(j)) : scene.heldAlong(i, j, n);
     return gap <= reach / S(1000) && u > fall * scene.settings.h + scene.settings.restitutionThreshold;
   }
 

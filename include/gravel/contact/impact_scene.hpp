@@ -20,6 +20,7 @@ namespace detail {
 /// \tparam Support  `support(i)` [m s^-2]: what the contacts that hold body i add to its acceleration. What
 /// rests on something would else be seen to rise by g h/2 at the start of a step and to sink at its end: a
 /// ball on it would be thrown up for ever. `support.any(i)`: the same also of contacts that stop it.
+/// `support.fall(i)` [m s^-2]: against what they hold it.
 template <class S, class B, class Course, class Support = NoSupport>
 struct ImpactScene {
   B& bodies;
@@ -53,10 +54,18 @@ struct ImpactScene {
   Vector3<S> freeAcceleration(std::uint32_t i) const {
     return isMovable(bodies, i) ? Vector3<S>(course.acceleration(bodies, i)) : Vector3<S>(Vector3<S>::Zero());
   }
+  /// The size of that [m s^-2], from what it leans on: see ProblemBodies::fallOf().
+  S fallOf(std::uint32_t i) const {
+    if constexpr (!std::is_same_v<Support, NoSupport>) {
+      return isMovable(bodies, i) ? support.fall(i) : S(0);
+    } else {
+      return safeNorm(freeAcceleration(i));
+    }
+  }
   /// The most [m s^-2] by which a body that leans on others would fall along n without them: what they hold
-  /// it with, no more than its own acceleration. Nothing along a table or a wall, nor in free fall.
+  /// it with, no more than its own fall. Nothing along a table or a wall, nor in free fall.
   S heldAlong(std::uint32_t i, const Vector3<S>& n) const {
-    const S fall = safeNorm(freeAcceleration(i));
+    const S fall = fallOf(i);
     if constexpr (!std::is_same_v<Support, NoSupport>) {
       return isFree(i)              ? S(0)
              : isMovable(bodies, i) ? std::min<S>(fall, sizeOf<S>(n.dot(Vector3<S>(support.any(i)))))

@@ -5,6 +5,7 @@
 
 #include <gravel/contact/contact_coloring.hpp>
 #include <gravel/contact/row_watch.hpp>
+#include <gravel/contact/solver_islands.hpp>
 #include <gravel/contact/solver_rows.hpp>
 #include <gravel/contact/turning_pair.hpp>
 #include <gravel/core/packed.hpp>
@@ -44,6 +45,10 @@ class ProblemBodies {
     });
   }
 
+  /// [m s^-2] Against this contacts hold a body: its acceleration; where nothing stands still, less that of
+  /// what hangs together with it.
+  const S& fallOf(std::uint32_t slot) const { return initial[slot].fall; }
+
   /// What impulses did to the velocity of a body [m s^-1].
   Vector3<S> changeOf(std::uint32_t slot) const {
     return scaled<S>(Vector3<S>(bodies[slot].v - initial[slot].v), -speedExponent_);
@@ -71,7 +76,9 @@ class ProblemBodies {
   using Scales = ProblemScales<S>;
 
   template <class B>
-  void gatherBodies(const B& source, const ContactColoring& colouring, const S& ratio) {
+  void gatherBodies(const B& source, const ContactColoring& colouring, const SolverIslands& islands,
+                    const S& ratio) {
+    findFalls(source, colouring, islands);
     const std::size_t n = colouring.bodies().size();
     resizeSparingly(bodies, n + 1);
     resizeSparingly(initial, n + 1);
@@ -81,7 +88,7 @@ class ProblemBodies {
     const Scales scales = orderedSum(n, chunk, Scales{}, [&](std::size_t begin, std::size_t end) {
       Scales part;
       for (std::size_t slot = begin; slot < end; ++slot) {
-        Body now = take(source, colouring, slot);
+        Body now = take(source, colouring, islands, slot);
         part += {std::max<S>(maxAbs(now.v), maxAbs(now.s)), S(0), now.inverseMass, now.inverseMass};
         if (now.inverseMass > S(0)) {
           part.leastFall = std::min<S>(part.leastFall, initial[slot].fall);
@@ -142,7 +149,7 @@ class ProblemBodies {
       const Vector3<S> dv = start.v;
       const Vector3<S> ds = start.s;
       if (plain) {
-        b = take(source, colouring, slot);
+        b = take(source, colouring, islands, slot);
       }
       b.v = scaled<S>(b.v, speedExponent_);
       b.s = scaled<S>(b.s, speedExponent_);
@@ -185,9 +192,38 @@ class ProblemBodies {
     return bends ? bend_[colouring.bodies()[slot]] : Vector3<S>(Vector3<S>::Zero());
   }
 
+  /// By which the centre of mass of an island falls: no contact holds it against that, and who falls with it
+  /// sees nothing of it.
+  struct IslandFall {
+    S mass = S(0);
+    Vector3<S> a = Vector3<S>::Zero();     ///< [m s^-2] by forces
+    Vector3<S> bend = Vector3<S>::Zero();  ///< [m s^-2] that its frame adds
+  };
+
+  /// One after the other, in the order of slots. O(bodies) where islands are free.
+  template <class B>
+  void findFalls(const B& source, const ContactColoring& colouring, const SolverIslands& islands) {
+    if (!islands.areFree()) {
+      return;
+    }
+    common_.assign(islands.size(), IslandFall{});
+    for (std::uint32_t slot = 0; slot < colouring.bodies().size(); ++slot) {
+      if (colouring.movable(slot)) {
+        // The mean so far moves by the share of each, so that no unit is too large or too small.
+        IslandFall& common = common_[islands.of(slot)];
+        const S mass = source.masses()[colouring.bodies()[slot]];
+        common.mass += mass;
+        const S share = mass / common.mass;
+        common.a += share * Vector3<S>(accelerationOf(source, colouring, slot) - common.a);
+        common.bend += share * Vector3<S>(bendAt(colouring, slot) - common.bend);
+      }
+    }
+  }
+
   /// A body with its mass in place of its inverse, until the scale of masses is known.
   template <class B>
-  Body take(const B& source, const ContactColoring& colouring, std::size_t slot) {
+  Body take(const B& source, const ContactColoring& colouring, const SolverIslands& islands,
+            std::size_t slot) {
     const std::uint32_t i = colouring.bodies()[slot];
     Body b;
     const bool movable = colouring.movable(static_cast<std::uint32_t>(slot));
@@ -195,12 +231,18 @@ class ProblemBodies {
     const S k = source.inertiaFactors()[i];
     b.v = velocityOf(source, i);
     b.s = friction ? Vector3<S>(r * spinOf(source, i)) : Vector3<S>(Vector3<S>::Zero());
+    Vector3<S> a = accelerationOf(source, colouring, slot);
+    Vector3<S> bend = bendAt(colouring, slot);
+    if (movable && islands.areFree()) {
+      const IslandFall& common = common_[islands.of(static_cast<std::uint32_t>(slot))];
+      a -= common.a;
+      bend -= common.bend;
+    }
     // Kicks are by forces alone, drifts bend by what the frame adds: where the two nearly cancel, as in what
     // hardly holds together in the tide, each brings together what rests, more than their sum does.
-    const Vector3<S> a = accelerationOf(source, colouring, slot);
     initial[slot].fall = safeNorm(a);
     if (!bend_.empty()) {
-      initial[slot].fall = std::max<S>(initial[slot].fall, safeNorm(Vector3<S>(a + bendAt(colouring, slot))));
+      initial[slot].fall = std::max<S>(initial[slot].fall, safeNorm(Vector3<S>(a + bend)));
     }
     initial[slot].radius = r;
     b.inverseMass = movable ? S(source.masses()[i]) : S(0);
@@ -213,6 +255,7 @@ class ProblemBodies {
   bool sameScales_ = false;           ///< as in the last problem
   bool turns_ = false;                ///< spins may count in TurningPair
   std::span<const Vector3<S>> bend_;  ///< of WayAhead
+  std::vector<IslandFall> common_;    ///< by the slot that stands for the island
   /// Above that an impulse of the last problem would leave nothing but its rounding: speeds have fallen.
   S mostGuess_ = S(0);
 };

@@ -41,7 +41,7 @@ struct alignas(rowAlignment<S>) SolverBody {
 template <Real S>
 struct alignas(rowAlignment<S>) SolverStart {
   Vector3<S> v;
-  S fall;  ///< [m s^-2] its acceleration; 0 of what nothing moves
+  S fall;  ///< [m s^-2] of ProblemBodies::fallOf(); 0 of what nothing moves
   Vector3<S> s;
   S radius;  ///< [m]
 };

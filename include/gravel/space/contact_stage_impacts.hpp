@@ -86,12 +86,15 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
       return none ? Vector3<Scalar>(Vector3<Scalar>::Zero())
                   : Vector3<Scalar>(solver.changeOf(i) * (Scalar(2) / h));
     }
+    Scalar fall(std::uint32_t i) const {
+      return none || !solver.knows(i) ? detail::safeNorm(Vector3<Scalar>(bodies.accelerations()[i]))
+                                      : solver.fallOf(i);
+    }
     // Contacts that bear a body change its velocity by what it falls in half a step; those that stop it, by
     // more.
     Vector3<Scalar> operator()(std::uint32_t i) const {
       const Vector3<Scalar> held = any(i);
-      const Scalar most = Scalar(2) * detail::safeNorm(Vector3<Scalar>(bodies.accelerations()[i]));
-      return detail::safeNorm(held) > most ? Vector3<Scalar>(Vector3<Scalar>::Zero()) : held;
+      return detail::safeNorm(held) > Scalar(2) * fall(i) ? Vector3<Scalar>(Vector3<Scalar>::Zero()) : held;
     }
   } support{solver_, bodies, h, contacts_.empty()};
   ImpactReport<Scalar> blows;
