@@ -9,6 +9,7 @@
 #include <gravel/core/packed.hpp>
 
 #include <array>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -204,7 +205,9 @@ template <Real S>
   PackedVector<S> jt = choose(changes.rubs, wanted, row.jt);
   if (changes.slides.any()) {
     const P limit = choose(sliding.kinetic, row.slide, row.stick);
-    const P kept = limit * row.jn / squareRoot(choose(changes.slides, size_sq, P::all(S(1))));
+    // Roots of lanes may take subnormal numbers for 0.
+    const P normal_sq = largerOf(size_sq, P::all(std::numeric_limits<S>::min()));
+    const P kept = limit * row.jn / squareRoot(choose(changes.slides, normal_sq, P::all(S(1))));
     jt = choose(changes.slides, kept * wanted, jt);
   }
   changes.dt = jt - row.jt;
