@@ -86,17 +86,16 @@ class GaussRadau15 {
     last_.next = wanted;
   }
 
-  /// A first guess, which rejections make shorter: a hundredth of the least v/a, where bodies move; at most
-  /// h.
+  /// A first guess, which rejections make shorter: a hundredth of the least v/a, by their largest
+  /// coefficients, where bodies move; at most h.
   template <class Layout>
   static Scalar firstStep(const Bodies<Scalar, Layout>& bodies, const Scalar& h) {
-    using std::sqrt;
     Scalar step = h;
     for (std::size_t i = 0; i < bodies.size(); ++i) {
-      const Scalar v_sq = bodies[i].countingVelocity().squaredNorm();
-      const Scalar a_sq = bodies.accelerations()[i].squaredNorm();
-      if (v_sq > Scalar(0) && a_sq > Scalar(0)) {
-        step = std::min<Scalar>(step, sqrt(Scalar(v_sq / a_sq)) / Scalar(100));
+      const Scalar v = bodies[i].countingVelocity().cwiseAbs().maxCoeff();
+      const Scalar a = bodies.accelerations()[i].cwiseAbs().maxCoeff();
+      if (v > Scalar(0) && a > Scalar(0)) {
+        step = std::min<Scalar>(step, v / a / Scalar(100));
       }
     }
     return step;
@@ -221,7 +220,7 @@ class GaussRadau15 {
       ++iterations_;
       // What is left is the change times the rate at which changes shrink.
       const Scalar least = Eigen::NumTraits<Scalar>::epsilon() * size / Scalar(64);
-      if (!(change > least) || (iteration > 1 && change * change <= least * before) ||
+      if (!(change > least) || (iteration > 1 && change / before <= least / change) ||
           (iteration > 2 && !(change < before))) {
         break;
       }
@@ -237,7 +236,8 @@ class GaussRadau15 {
     dx_ = detail::dot(F_, weights_.jerk);
     dv_ = detail::dot(F_, weights_.snap);
     xTermLow_ = detail::dot(F_, weights_.crackle);
-    const auto squared = [](const auto& v) { return Scalar(v.square().sum()); };
+    const Scalar unit = largest > Scalar(0) ? largest : Scalar(1);  // in which fourth powers are in range
+    const auto squared = [&](const auto& v) { return Scalar((v / unit).square().sum()); };
     const auto root = [](const Scalar& x) { return x > Scalar(0) ? Scalar(sqrt(x)) : Scalar(0); };
     const Scalar eps = Eigen::NumTraits<Scalar>::epsilon();
     const auto isRounding = [&](Eigen::Index at) {
