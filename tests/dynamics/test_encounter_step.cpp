@@ -200,6 +200,74 @@ TEST_CASE("The likeliest partner stands where it alone would cause the accelerat
   }
 }
 
+// Spheres of unequal radii among points, some fixed, and a group that flies by the others at a thousand times
+// their speeds, by which no pair of the group asks for anything; and, `size` 0, all in one place. Above the
+// limit pairs are searched by a tree, here against all of them, unless it is enough that no sphere moves by a
+// quarter of its radius relative to the common centre of mass. That was the rule for all until then: a pile
+// of 200 grains about a planet got steps of that on its orbit, one of 100 those of its own motion.
+TEST_CASE("No pair among many meets deeper than a quarter of the smaller radius, unless none moves as far") {
+  const auto scene = [](std::size_t n, double size, double flyby) {
+    std::vector<Body<double>> list(n);
+    const CounterRandom random(11);
+    for (std::uint64_t i = 0; i < n; ++i) {
+      Body<double>& body = list[i];
+      const bool group = i % 3 == 0;
+      body.position = size * random.uniform(9 * i, 0.0, 1.0) * random.direction(9 * i + 1);
+      body.velocity = random.uniform(9 * i + 3, 0.0, 1.0) * random.direction(9 * i + 4);
+      body.position[0] += group ? 500 * size : 0;
+      body.velocity[1] += group ? flyby : 0;
+      body.radius = i % 5 == 0 ? 0 : random.uniform(9 * i + 6, 0.01, 0.5);
+      body.fixed = !group && i % 7 == 0;
+    }
+    return list;
+  };
+  const auto moves = [](const Body<double>& body) { return body.fixed ? Vec(0, 0, 0) : body.velocity; };
+  const auto byPairs = [&](const std::vector<Body<double>>& list) {
+    double most = 0;
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      for (std::size_t j = 0; j < i; ++j) {
+        const double smaller = std::min(list[i].radius, list[j].radius);
+        const double r = smaller > 0 ? smaller : list[i].radius + list[j].radius;
+        const double gap = (list[i].position - list[j].position).norm() - list[i].radius - list[j].radius;
+        if (r > 0) {
+          most = std::max(most, (moves(list[i]) - moves(list[j])).norm() / (r / 4 + std::max(0.0, gap)));
+        }
+      }
+    }
+    return 1 / most;
+  };
+  const auto bySingles = [&](const std::vector<Body<double>>& list) {
+    Vec v = Vec::Zero();
+    for (const Body<double>& body : list) {  // of equal masses
+      v += moves(body) / static_cast<double>(list.size());
+    }
+    double least = 1e300;
+    for (const Body<double>& body : list) {
+      if (body.radius > 0 && !body.fixed) {
+        least = std::min(least, body.radius / 4 / (body.velocity - v).norm());
+      }
+    }
+    return least;
+  };
+  for (const std::size_t n : {std::size_t{129}, std::size_t{200}, std::size_t{3001}}) {
+    for (const auto& [size, flyby, pairs] :
+         {std::tuple{20.0, 0.0, true}, std::tuple{20.0, 1e3, true}, std::tuple{0.0, 0.0, false}}) {
+      CAPTURE(n, size, flyby);
+      std::vector<Body<double>> list = scene(n, size, flyby);
+      REQUIRE((byPairs(list) > bySingles(list)) == pairs);
+      const double h = stepFromEncounters(made(list), 1e-30, 0.0, wide);
+      CHECK_THAT(h, WithinRel(std::max(byPairs(list), bySingles(list)), 1e-12));
+      if (pairs) {
+        std::reverse(list.begin(), list.end());
+        CHECK(stepFromEncounters(made(list), 1e-30, 0.0, wide) == h);
+      }
+    }
+  }
+  std::vector<Body<double>> points(200);
+  points[0].velocity = {1, 0, 0};
+  CHECK(stepFromEncounters(made(points), 1e-30, 0.0, StepLimits<double>{0.02, 0.0, 1.0}) == 1.0);
+}
+
 // Seen to fail: 1/next = 1.9/wanted - 0.9/last.
 TEST_CASE("The reversible step is its own inverse, and the step wanted where that is constant or far") {
   const CounterRandom random(2);

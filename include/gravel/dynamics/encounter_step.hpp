@@ -13,6 +13,7 @@
 /// through a point of zero acceleration.
 
 #include <gravel/dynamics/adaptive_step.hpp>
+#include <gravel/dynamics/nearest_meeting.hpp>
 
 namespace gravel {
 
@@ -141,11 +142,13 @@ void lookAtLikeliest(const Bodies<Scalar, Layout>& bodies, const S& G, const S& 
 
 }  // namespace detail
 
-/// The step by the rules above, within the limits and not below 1e-12 of the longest. Up to `encounterPairs`
-/// bodies O(N^2), about as dear as their gravity, and also no pair meets deeper than a quarter of the smaller
-/// radius in a step; above O(N), and no sphere moves by more than a quarter of its radius (see
-/// `stepFromMotion`).
-/// \param pairs false where pairs may be nearest through images: above is then meant for any number
+/// The step by the rules above, within the limits and not below 1e-12 of the longest; nor does any pair meet
+/// deeper than a quarter of the smaller radius in a step. Up to `encounterPairs` bodies O(N^2), about as dear
+/// as their gravity. Above O(N); there it is enough, too, if no sphere moves by more than a quarter of its
+/// radius, relative to the common centre of mass, and only where that asks for a shorter step pairs are
+/// searched, in O(N log N).
+/// \param pairs false where pairs may be nearest through images: above is then meant for any number, and no
+///        sphere moves by more than a quarter of its radius
 template <Real Scalar, class Layout>
 Scalar stepFromEncounters(const Bodies<Scalar, Layout>& bodies, const Scalar& G, const Scalar& softening,
                           const StepLimits<Scalar>& limits, bool pairs = true) {
@@ -154,14 +157,21 @@ Scalar stepFromEncounters(const Bodies<Scalar, Layout>& bodies, const Scalar& G,
   const S T = S(limits.largest) / S(limits.factor);
   S sum(0);
   S approach(0);
-  if (pairs && bodies.size() <= encounterPairs) {
+  const bool few = bodies.size() <= encounterPairs;
+  if (pairs && few) {
     detail::EncounterTable<S>(bodies).look(S(G), S(softening), T, sum, approach);
   } else {
     detail::lookAtLikeliest<S>(bodies, S(G), S(softening), T, sum, approach);
   }
   S h = S(limits.largest) / detail::eighthRoot(S(S(1) + sum));
+  const S longest = S(limits.contactSteps) * T;  // over the square root of an approach
+  if (pairs && !few && longest < h * sqrt(approach)) {
+    const S enough = approach / (T * T);
+    const S most = detail::NearestMeeting<S>(bodies).mostRateSq(enough);
+    approach = most < enough ? S(T * T * most) : approach;
+  }
   if (approach > S(0)) {
-    h = std::min<S>(h, S(limits.contactSteps) * T / sqrt(approach));
+    h = std::min<S>(h, longest / sqrt(approach));
   }
   return std::clamp<Scalar>(Scalar(h), std::max<Scalar>(limits.smallest, limits.largest * Scalar(1e-12)),
                             limits.largest);
