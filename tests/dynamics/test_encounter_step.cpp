@@ -249,14 +249,16 @@ TEST_CASE("No pair among many meets deeper than a quarter of the smaller radius,
     }
     return least;
   };
-  for (const std::size_t n : {std::size_t{129}, std::size_t{200}, std::size_t{3001}}) {
+  for (const std::size_t n : {std::size_t{129}, std::size_t{200}, std::size_t{1001}}) {
     for (const auto& [size, flyby, pairs] :
          {std::tuple{20.0, 0.0, true}, std::tuple{20.0, 1e3, true}, std::tuple{0.0, 0.0, false}}) {
       CAPTURE(n, size, flyby);
       std::vector<Body<double>> list = scene(n, size, flyby);
-      REQUIRE((byPairs(list) > bySingles(list)) == pairs);
+      const double ofPairs = byPairs(list);
+      const double ofSingles = bySingles(list);
+      REQUIRE((ofPairs > ofSingles) == pairs);
       const double h = stepFromEncounters(made(list), 1e-30, 0.0, wide);
-      CHECK_THAT(h, WithinRel(std::max(byPairs(list), bySingles(list)), 1e-12));
+      CHECK_THAT(h, WithinRel(std::max(ofPairs, ofSingles), 1e-12));
       if (pairs) {
         std::reverse(list.begin(), list.end());
         CHECK(stepFromEncounters(made(list), 1e-30, 0.0, wide) == h);
