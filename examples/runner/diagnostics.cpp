@@ -26,7 +26,6 @@ void Diagnostics::record(const Space<double>& space) {
   h.inPlay = std::max(h.inPlay, e.kinetic + e.rotational + std::abs(e.potential));
   h.peakMotion = std::max(h.peakMotion, e.kinetic + e.rotational);
   h.worstDrift = std::max(h.worstDrift, std::abs(h.drift()));
-  h.mostContacts = std::max(h.mostContacts, space.contactCount());
   ++h.rows;
   file_ << space.time() << ',' << space.steps() << ',' << space.getPreviousTimeStep() << ','
         << space.contactCount() << ',' << e.kinetic << ',' << e.rotational << ',' << e.potential << ','

@@ -17,7 +17,7 @@ struct History {
   double inPlay = 0.0;  ///< most kinetic + rotational + |potential| energy seen: the scale of the drift
   double worstDrift = 0.0;
   double peakMotion = 0.0;  ///< most kinetic + rotational energy seen
-  std::size_t mostContacts = 0;
+  std::size_t mostContacts = 0;  ///< of all steps, not of the rows alone
   std::size_t rows = 0;
   std::size_t steps = 0;  ///< that were counted
   std::size_t parts = 0;  ///< of these, each with its own contacts
@@ -36,6 +36,7 @@ class Diagnostics {
   /// A step is over.
   void count(const Space<double>& space) {
     ++history_.steps;
+    history_.mostContacts = std::max(history_.mostContacts, space.contactCount());
     history_.parts += space.contactSubsteps();
     history_.mostParts = std::max(history_.mostParts, space.contactSubsteps());
   }
