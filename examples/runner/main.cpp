@@ -34,7 +34,16 @@ namespace fs = std::filesystem;
 
 volatile std::sig_atomic_t stopRequested = 0;
 
-void requestStop(int) { stopRequested = 1; }
+/// The first signal ends the run in order, a second one the program at once.
+void requestStop(int signal) {
+  stopRequested = 1;
+  std::signal(signal, SIG_DFL);
+}
+
+void onStopSignals(void (*handler)(int)) {
+  std::signal(SIGINT, handler);
+  std::signal(SIGTERM, handler);
+}
 
 struct Options {
   std::string sceneFile, output;
@@ -166,6 +175,7 @@ int run(const Options& options) {
     progress.show(space, diagnostics.history().drift());
   };
 
+  onStopSignals(requestStop);
   observe();
   const double near = 1.0 - 1e-9;  // of the end: a step that lands beside it by rounding is the last one
   while (space.time() < scene.duration && stopRequested == 0) {
@@ -207,6 +217,7 @@ int run(const Options& options) {
   if (series) {
     tell("Frames:", series->index().string() + "  (" + std::to_string(series->frames()) + ", for ParaView)");
   }
+  onStopSignals(SIG_DFL);  // all but the picture is there
   if (!options.noPicture && writePicture(folder / "picture.png", scene, space, trails)) {
     tell("Picture:", folder / "picture.png");
   }
@@ -268,8 +279,6 @@ int main(int argc, char** argv) {
     omp_set_num_threads(options.threads);
   }
 #endif
-  std::signal(SIGINT, requestStop);
-  std::signal(SIGTERM, requestStop);
   try {
     const int status = run(options);
     requirePrinted();
