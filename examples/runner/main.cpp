@@ -15,7 +15,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <new>
 
@@ -148,6 +147,11 @@ int run(const Options& options) {
 
   const fs::path folder =
       madeFolder(options.output.empty() ? fs::path("out") / scene.name : fs::path(options.output));
+  // What an earlier run said at its end is not of this one, which may end without a word.
+  for (const fs::path& last :
+       {fs::path("summary.txt"), fs::path("picture.png"), "frames" / fs::path(scene.name + ".pvd")}) {
+    fs::remove(folder / last);
+  }
   Diagnostics diagnostics(folder / "diagnostics.csv");
   std::optional<VtkSeries> series;
   if (scene.output.frames > 0) {
@@ -194,12 +198,7 @@ int run(const Options& options) {
 
   const RunFacts facts{stopRequested != 0, progress.seconds(), threadCount()};
   const std::string words = summary(scene, space, diagnostics.history(), facts);
-  {
-    std::ofstream file(folder / "summary.txt");
-    if (!(file << words << std::flush)) {  // without it, what a full disk refuses is only known too late
-      throw std::runtime_error("cannot write " + (folder / "summary.txt").string());
-    }
-  }
+  detail::writeFileWhole(folder / "summary.txt", words);
   if (talks) {
     std::printf("\n%s\n", words.c_str());
   }

@@ -3,7 +3,7 @@
 #ifdef GRAVEL_RUN_PICTURES
 
 #include <algorithm>
-#include <fstream>
+#include <new>
 
 #if defined(__GNUC__)
 #pragma GCC diagnostic push
@@ -102,17 +102,16 @@ bool writePicture(const std::filesystem::path& path, const Scene& scene, const S
   }
 
   const std::vector<std::uint8_t> pixels = render(picture);
-  std::ofstream file(path, std::ios::binary);
-  const auto write = [](void* context, void* data, int size) {
-    static_cast<std::ofstream*>(context)->write(static_cast<const char*>(data), size);
+  std::string png;
+  const auto append = [](void* context, void* data, int size) {
+    static_cast<std::string*>(context)->append(static_cast<const char*>(data),
+                                               static_cast<std::size_t>(size));
   };
   const View& view = picture.view;
-  const int made =
-      stbi_write_png_to_func(write, &file, view.width, view.height, 3, pixels.data(), 3 * view.width);
-  file.close();
-  if (made == 0 || !file) {
-    throw std::runtime_error("cannot write " + path.string());
+  if (stbi_write_png_to_func(append, &png, view.width, view.height, 3, pixels.data(), 3 * view.width) == 0) {
+    throw std::bad_alloc();  // all that it can fail by
   }
+  detail::writeFileWhole(path, png);
   return true;
 }
 
