@@ -16,7 +16,7 @@ struct History {
   EnergyLedger<double> first, last;
   double inPlay = 0.0;  ///< most kinetic + rotational + |potential| energy seen: the scale of the drift
   double worstDrift = 0.0;
-  double peakMotion = 0.0;  ///< most kinetic + rotational energy seen
+  double peakMotion = 0.0;       ///< most kinetic + rotational energy seen
   std::size_t mostContacts = 0;  ///< of all steps, not of the rows alone
   std::size_t rows = 0;
   std::size_t steps = 0;  ///< that were counted

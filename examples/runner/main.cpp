@@ -119,6 +119,15 @@ void waitPassively(char** argv) {
 #endif
 }
 
+/// A point of a body's path, after a gap if it lies across a face of the domain.
+void addToTrail(Trail& trail, const Vector3<double>& point, const Domain<double>& domain) {
+  if (!trail.empty() && !domain.isOpen() &&
+      ((point - trail.back()).array().abs() > 0.5 * domain.lengths().array()).any()) {
+    trail.push_back(Trail::value_type::Constant(std::nan("")));
+  }
+  trail.push_back(point);
+}
+
 int run(const Options& options) {
   Scene scene = options.sceneFile.empty() ? readScene(builtinScene, builtinSceneName)
                                           : readSceneFile(options.sceneFile);
@@ -173,7 +182,7 @@ int run(const Options& options) {
     }
     if (marks.isDue(space.time())) {
       for (std::size_t i = 0; i < trails.size(); ++i) {
-        trails[i].emplace_back(space.body(i).position());
+        addToTrail(trails[i], space.body(i).position(), space.domain());
       }
     }
     progress.show(space, diagnostics.history().drift());

@@ -9,8 +9,9 @@
 
 namespace gravel::runner {
 
-/// The places of every body at some times of the run.
-using Trails = std::vector<std::vector<Vector3<double>>>;
+/// The places of a body at some times of the run; NaN where it was taken across the domain.
+using Trail = std::vector<Vector3<double>>;
+using Trails = std::vector<Trail>;  ///< of every body
 
 /// False, and a line on stderr that says so, if the runner was built without tachyon.
 /// \throws std::runtime_error if the file cannot be written

@@ -205,29 +205,39 @@ class Renderer {
     constexpr std::size_t pieces = 24;
     std::vector<apivector> corners;
     Vector3<double> last = Vector3<double>::Zero();
+    bool goesOn = false;
     std::size_t begin = 0;
     for (std::size_t piece = 0; piece < pieces; ++piece) {
       const std::size_t end = trail.points.size() * (piece + 1) / pieces;
+      const float age = static_cast<float>(piece + 1) / static_cast<float>(pieces);  // 1: now
+      const float strength = 0.15F + 0.85F * age * age;
+      const Colour colour = trail.colour * strength + skyBelow() * (1.0F - strength);
       double pixel = 0.0;
-      corners.clear();
-      if (begin > 0) {
+      const auto draw = [&] {
+        if (corners.size() > 1 && pixel > 0.0) {
+          rt_polycylinder(scene(), texture(colour, 1.0, 0.0, 0.97), corners.data(),
+                          static_cast<int>(corners.size()), 0.7 * pixel);
+        }
+        corners.clear();
+      };
+      if (goesOn) {
         corners.push_back(vectorOf(last));
       }
       for (; begin < end; ++begin) {
         const Vector3<double> x = local(trail.points[begin]);
+        if (!x.allFinite()) {
+          draw();
+          goesOn = false;
+          continue;
+        }
         pixel = pixelAt(x);
-        if (begin == 0 || (x - last).norm() > 4.0 * pixel) {
+        if (!goesOn || (x - last).norm() > 4.0 * pixel) {
           corners.push_back(vectorOf(x));
           last = x;
+          goesOn = true;
         }
       }
-      if (corners.size() > 1 && pixel > 0.0) {
-        const float age = static_cast<float>(piece + 1) / static_cast<float>(pieces);  // 1: now
-        const float strength = 0.15F + 0.85F * age * age;
-        const Colour colour = trail.colour * strength + skyBelow() * (1.0F - strength);
-        rt_polycylinder(scene(), texture(colour, 1.0, 0.0, 0.97), corners.data(),
-                        static_cast<int>(corners.size()), 0.7 * pixel);
-      }
+      draw();
     }
   }
 

@@ -31,7 +31,7 @@ struct DrawnPlane {
   double top;  ///< nothing of it is drawn higher than this along `View::up`
 };
 
-/// A path drawn as a thin line, faint where it is old.
+/// A path drawn as a thin line, faint where it is old, with a gap at each point that is NaN.
 struct DrawnTrail {
   std::vector<Vector3<double>> points;
   Colour colour;
