@@ -18,7 +18,8 @@ namespace gravel {
 ///
 /// A list can be asked to hold for a whole step, along straight ways whose ends are known. A few bodies that
 /// leave their half of the skin, bullets among grains, do not spoil it: each of them is compared with all
-/// others, until a new search is cheaper.
+/// others, until a new search is cheaper. Nor does in an open domain what most have in common, a pile in
+/// orbit.
 template <Real S>
 class NeighbourList {
  public:
@@ -43,9 +44,10 @@ class NeighbourList {
     }
     comparisons_ += swift_.size();
     swiftPairs_.resize(std::max(swiftPairs_.size(), swift_.size()));
+    const auto rest = common_.lessThis(travel);
     parallelForTasks(swift_.size(), [&](std::size_t k) {
       swiftPairs_[k].clear();
-      detail::compare(swift_[k], positions, radii, ids, detail::wayOf<S>(travel, swift_[k]), travel,
+      detail::compare(swift_[k], positions, radii, ids, detail::wayOf<S>(rest, swift_[k]), rest,
                       S(room_ - skin_), free_, domain_, time_, swiftPairs_[k]);
     });
     for (std::size_t k = 0; k < swift_.size(); ++k) {
@@ -63,16 +65,13 @@ class NeighbourList {
   template <class Positions, class Radii, class Ids, class Travel>
   void follow(std::uint32_t i, const Positions& positions, const Radii& radii, const Ids& ids,
               const Vector3<S>& way, const Travel& travel, std::vector<Pair>& out) {
-    Vector3<S> x = positions[i];
-    x[1] += flow_ * x[0];
-    const S from_sq = domain_.minimumImage(x - places_[i], time_).squaredNorm();
-    x = Vector3<S>(positions[i]) + way;
-    x[1] += flow_ * x[0];
-    const S to_sq = domain_.minimumImage(x - places_[i], time_).squaredNorm();
-    if (!(S(4) * std::max<S>(from_sq, to_sq) <= free_ * free_)) {
+    const Vector3<S> x = positions[i];
+    if (!(std::max<S>(wayFrom_sq(i, x, common_.start()), wayFrom_sq(i, x + way, common_.end())) <=
+          half_sq_)) {
       ++comparisons_;
       strays_ = true;
-      detail::compare(i, positions, radii, ids, way, travel, S(room_ - skin_), free_, domain_, time_, out);
+      detail::compare(i, positions, radii, ids, Vector3<S>(way - (common_.end() - common_.start())),
+                      common_.lessThis(travel), S(room_ - skin_), free_, domain_, time_, out);
     }
   }
 
@@ -90,7 +89,7 @@ class NeighbourList {
 
   /// Whether some body was, or is on a way to be, further than half the skin from where the last search saw
   /// it.
-  bool strays() const { return strays_ || !swift_.empty(); }
+  bool strays() const { return strays_ || !swift_.empty() || !common_.isNone(); }
 
   /// Whether the last update searched.
   bool rebuilt() const { return rebuilt_; }
@@ -99,7 +98,9 @@ class NeighbourList {
 
   /// Why the last update searched, or why it did not.
   const char* reason() const {
-    return rebuilt_ ? reason_ : "no body has moved half the skin since the last search";
+    return rebuilt_            ? reason_
+           : !common_.isNone() ? "no body has left the others by half the skin since the last search"
+                               : "no body has moved half the skin since the last search";
   }
 
   /// The skin [m] of the list in use.
@@ -142,31 +143,40 @@ class NeighbourList {
       return margin > S(0) ? "the margin grew or the flow used up the skin" : "the flow used up the skin";
     }
     const std::size_t n = places_.size();
-    const bool isOpen = domain.isOpen();
+    common_.clear();
+    setHalf();
+    const char* reason = whoMoved(positions, radii, travel);
+    if (reason != tooFar || !domain.isOpen()) {
+      return reason;
+    }
+    const auto moved = [&](std::size_t i) { return Vector3<S>(Vector3<S>(positions[i]) - places_[i]); };
+    const auto moves = [&](std::size_t i) { return Vector3<S>(moved(i) + detail::wayOf<S>(travel, i)); };
+    common_.set(detail::commonWay<S>(n, moved), detail::commonWay<S>(n, moves));
+    setHalf();
+    return common_.isNone() ? reason : whoMoved(positions, radii, travel);
+  }
+
+  /// nullptr if all but the swift are within their half of the skin, less what all have in common.
+  template <class Positions, class Radii, class Travel>
+  const char* whoMoved(const Positions& positions, const Radii& radii, const Travel& travel) {
+    const std::size_t n = places_.size();
     parts_.resize((n + chunk - 1) / chunk);
     parallelForChunks<Share::Alike>(n, chunk, [&](std::size_t begin, std::size_t end) {
-      const auto wayFrom = [&](std::size_t i, const Vector3<S>& x) {
-        Vector3<S> d = x - places_[i];
-        if (!isOpen) {
-          d[1] += flow_ * x[0];
-          d = domain.minimumImage(d, time_);
-        }
-        return d.squaredNorm();
-      };
       const auto farthest = [&](std::size_t i) {
         const Vector3<S> x = positions[i];
-        const S d_sq = wayFrom(i, x);
+        const S d_sq = wayFrom_sq(i, x, common_.start());
         if constexpr (std::is_same_v<Travel, AtRest>) {
           return d_sq;
         } else {
-          const S end_sq = wayFrom(i, Vector3<S>(x + Vector3<S>(travel(i))));
+          const S end_sq = wayFrom_sq(i, x + Vector3<S>(travel(i)), common_.end());
           return end_sq > d_sq || !(end_sq == end_sq) ? end_sq : d_sq;
         }
       };
       const auto same = [&](std::size_t i) { return radii[i] == radii_[i]; };
-      parts_[begin / chunk].look(begin, end, S(free_ * free_ / S(4)), farthest, same);
+      parts_[begin / chunk].look(begin, end, half_sq_, farthest, same);
     });
     moved_sq_ = S(0);
+    swift_.clear();
     for (const detail::Wandering<S>& part : parts_) {
       if (part.otherRadius) {
         return "a radius changed";
@@ -180,38 +190,38 @@ class NeighbourList {
     if (comparisons_ + swift_.size() <= mostComparisons && swift_.size() <= mostSwift(n)) {
       return nullptr;
     }
-    moved_sq_ = std::max<S>(moved_sq_, free_ * free_ / S(4));
+    moved_sq_ = std::max<S>(moved_sq_, half_sq_);
     for (std::size_t c = 0; c < parts_.size() && swift_.size() > mostSwift(n); ++c) {
       moved_sq_ = std::max<S>(moved_sq_, parts_[c].most_sq);
     }
-    return "bodies moved half the skin";
+    return tooFar;
   }
 
-  /// pairs_ and extra_ in one list, in the order of ids.
+  /// Of body i at x from where the last search saw it, less what all have in common.
+  [[gnu::always_inline]] S wayFrom_sq(std::size_t i, const Vector3<S>& x, const Vector3<S>& common) const {
+    Vector3<S> d = x - places_[i];
+    if (domain_.isOpen()) {
+      d -= common;
+    } else {
+      d[1] += flow_ * x[0];
+      d = domain_.minimumImage(d, time_);
+    }
+    return d.squaredNorm();
+  }
+
+  /// How far a body may get, less what subtraction loses: a few units in the last place of what is
+  /// subtracted.
+  void setHalf() {
+    const S half = free_ / S(2) - S(16) * detail::roundoff<S>() * common_.most();
+    half_sq_ = half > S(0) ? S(half * half) : S(0);
+  }
+
   template <class Ids>
   void join(const Ids& ids) {
-    if (extra_.empty()) {
-      return;
+    if (!extra_.empty()) {
+      ++version_;
+      detail::join(pairs_, extra_, ids, joined_);
     }
-    ++version_;
-    const auto keys = [&](const Pair& pair) {
-      return std::pair(detail::idKey(ids[pair.first]), detail::idKey(ids[pair.second]));
-    };
-    const auto before = [&](const Pair& a, const Pair& b) { return keys(a) < keys(b); };
-    std::sort(extra_.begin(), extra_.end(), before);
-    extra_.erase(std::unique(extra_.begin(), extra_.end()), extra_.end());
-    joined_.clear();
-    joined_.reserve(pairs_.size() + extra_.size());
-    auto from = pairs_.cbegin();  // few among many: those between two of them are copied as they are
-    for (const Pair& pair : extra_) {
-      const auto place = std::lower_bound(from, pairs_.cend(), pair, before);
-      joined_.insert(joined_.end(), from, place);
-      if (place == pairs_.cend() || *place != pair) {
-        joined_.push_back(pair);
-      }
-      from = place;
-    }
-    joined_.insert(joined_.end(), from, pairs_.cend());
   }
 
   template <class Positions, class Radii, class Ids, class Travel>
@@ -237,17 +247,27 @@ class NeighbourList {
     const auto middle = spheres.begin() + static_cast<std::ptrdiff_t>(spheres.size() / 2);
     std::nth_element(spheres.begin(), middle, spheres.end());
     const S median = spheres.empty() ? S(0) : *middle;
-    skin_ = fixedSkin_ ? *fixedSkin_ : chooseSkin(median, motionSeen);
+    using std::sqrt;
+    skin_ = fixedSkin_ ? *fixedSkin_
+                       : detail::skinFor(median,
+                                         motionSeen && moved_sq_ > S(0)
+                                             ? S(S(2) * S(sqrt(moved_sq_)) / S(static_cast<double>(updates_)))
+                                             : S(0));
     swift_.clear();
+    flow_ = S(0);
+    common_.clear();
     if constexpr (!std::is_same_v<Travel, AtRest>) {
-      skin_ = std::max<S>(skin_, detail::takeSwift(n, mostSwift(n), skin_, travel, swift_));
+      if (domain.isOpen()) {
+        common_.set(Vector3<S>::Zero(), detail::commonWay<S>(n, travel));
+      }
+      skin_ = std::max<S>(skin_, detail::takeSwift(n, mostSwift(n), skin_, common_.lessThis(travel), swift_));
     }
     free_ = skin_;
-    flow_ = S(0);
+    setHalf();
     comparisons_ = 0;
     room_ = margin + skin_;
     // Distances at both times and the displacement are rounded: a few units of what is subtracted.
-    S scale = S(2) * largest_ + room_;
+    S scale = S(2) * largest_ + room_ + common_.most();
     if (!domain.isOpen()) {
       scale += domain.lengths().maxCoeff();
     }
@@ -260,24 +280,7 @@ class NeighbourList {
     built_ = true;
   }
 
-  /// So thick that the list would have held for `goodLife` updates of the motion last seen, within a fraction
-  /// of the median radius (a mean would be that of a giant among grains); no skin at all where it would not
-  /// even hold for two.
-  S chooseSkin(const S& radius, bool motionSeen) {
-    constexpr double goodLife = 16.0;
-    const S thickest = S(0.8) * radius;
-    const S thinnest = S(0.02) * radius;
-    if (!motionSeen || !(moved_sq_ > S(0))) {
-      return S(0.1) * radius;
-    }
-    using std::sqrt;
-    const S perUpdate = S(2) * S(sqrt(moved_sq_)) / S(static_cast<double>(updates_));
-    if (S(2) * perUpdate > thickest) {
-      return S(0);
-    }
-    return std::min(std::max(S(S(goodLife) * perUpdate), thinnest), thickest);
-  }
-
+  static constexpr const char* tooFar = "bodies moved half the skin";
   static constexpr std::size_t chunk = 512;
   /// A search costs about as much as this many comparisons of one body with all others.
   static constexpr std::size_t mostComparisons = 128;
@@ -297,8 +300,10 @@ class NeighbourList {
   S time_ = S(0);
   S largest_ = S(0);
   S skin_ = S(0);
-  S room_ = S(0);  ///< margin and skin of the last search
-  S free_ = S(0);  ///< what is left of the skin
+  S room_ = S(0);     ///< margin and skin of the last search
+  S free_ = S(0);     ///< what is left of the skin
+  S half_sq_ = S(0);  ///< how far a body may get, squared
+  detail::CommonMotion<S> common_;
   S flow_ = S(0);  ///< [1] shear since the last search
   S moved_sq_ = S(0);
   std::optional<S> fixedSkin_;

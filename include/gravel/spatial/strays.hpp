@@ -1,15 +1,13 @@
 #pragma once
 
 /// \file
-/// Bodies that outrun the skin of a neighbour list: which they are, and the comparison of one with all
-/// others.
+/// What bodies have in common as they move, and those that outrun the skin of a neighbour list: which they
+/// are, and the comparison of one with all others.
 
+#include <gravel/spatial/common_motion.hpp>
 #include <gravel/spatial/pair.hpp>
 
 namespace gravel {
-
-/// Bodies that stay where they are for as long as the list is asked to hold.
-struct AtRest {};
 
 namespace detail {
 
@@ -58,21 +56,22 @@ struct Wandering {
   }
 };
 
-/// [1] Of the scalar, or of double where the scalar does not say.
+/// [m] So thick that a list would hold for sixteen updates of the motion last seen, within a fraction of the
+/// median radius (a mean would be that of a giant among grains); no skin at all where it would not even hold
+/// for two.
+/// \param perUpdate [m] what an update took of the skin; 0 if that is not known
 template <Real S>
-S roundoff() {
-  using Limits = std::numeric_limits<S>;
-  return Limits::is_specialized ? S(Limits::epsilon()) : S(std::numeric_limits<double>::epsilon());
-}
-
-/// Way [m] of body i; zero for `AtRest`.
-template <Real S, class Travel>
-Vector3<S> wayOf(const Travel& travel, std::size_t i) {
-  if constexpr (std::is_same_v<Travel, AtRest>) {
-    return Vector3<S>::Zero();
-  } else {
-    return travel(i);
+S skinFor(const S& radius, const S& perUpdate) {
+  constexpr double goodLife = 16.0;
+  const S thickest = S(0.8) * radius;
+  const S thinnest = S(0.02) * radius;
+  if (!(perUpdate > S(0))) {
+    return S(0.1) * radius;
   }
+  if (S(2) * perUpdate > thickest) {
+    return S(0);
+  }
+  return std::min(std::max(S(S(goodLife) * perUpdate), thinnest), thickest);
 }
 
 /// Appends the pairs of body i on its way, with others on theirs. O(N).
@@ -151,6 +150,30 @@ S takeSwift(std::size_t n, std::size_t most, const S& skin, const Travel& travel
   }
   std::sort(swift.begin(), swift.end());
   return enough;
+}
+
+/// `pairs` and `extra`, which is left sorted and without doubles, in one list, in the order of ids.
+template <class Ids>
+void join(const std::vector<Pair>& pairs, std::vector<Pair>& extra, const Ids& ids,
+          std::vector<Pair>& joined) {
+  const auto keys = [&](const Pair& pair) {
+    return std::pair(idKey(ids[pair.first]), idKey(ids[pair.second]));
+  };
+  const auto before = [&](const Pair& a, const Pair& b) { return keys(a) < keys(b); };
+  std::sort(extra.begin(), extra.end(), before);
+  extra.erase(std::unique(extra.begin(), extra.end()), extra.end());
+  joined.clear();
+  joined.reserve(pairs.size() + extra.size());
+  auto from = pairs.cbegin();  // few among many: those between two of them are copied as they are
+  for (const Pair& pair : extra) {
+    const auto place = std::lower_bound(from, pairs.cend(), pair, before);
+    joined.insert(joined.end(), from, place);
+    if (place == pairs.cend() || *place != pair) {
+      joined.push_back(pair);
+    }
+    from = place;
+  }
+  joined.insert(joined.end(), from, pairs.cend());
 }
 
 }  // namespace detail

@@ -1,0 +1,109 @@
+#pragma once
+
+/// \file
+/// What bodies have in common as they move: a pile in orbit is the same to look at as one at rest.
+
+#include <gravel/core/types.hpp>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+namespace gravel {
+
+/// Bodies that stay where they are for as long as the list is asked to hold.
+struct AtRest {};
+
+namespace detail {
+
+/// [1] Of the scalar, or of double where the scalar does not say.
+template <Real S>
+S roundoff() {
+  using Limits = std::numeric_limits<S>;
+  return Limits::is_specialized ? S(Limits::epsilon()) : S(std::numeric_limits<double>::epsilon());
+}
+
+/// Way [m] of body i; zero for `AtRest`.
+template <Real S, class Travel>
+Vector3<S> wayOf(const Travel& travel, std::size_t i) {
+  if constexpr (std::is_same_v<Travel, AtRest>) {
+    return Vector3<S>::Zero();
+  } else {
+    return travel(i);
+  }
+}
+
+/// What n ways have in common, as those of a pile in orbit do: the median of each component among at most 63
+/// of them, evenly spaced; zero unless it leaves of seven in eight at most half as much. The eighth, bullets
+/// or a planet, has no say. Of ways or velocities. O(1). \param way `way(i)`: that of body i
+template <Real S, class Way>
+Vector3<S> commonWay(std::size_t n, Way&& way) {
+  constexpr std::size_t most = 63;
+  std::array<Vector3<S>, most> ways;
+  std::array<S, most> numbers;
+  std::size_t count = 0;
+  const std::size_t asked = std::min(n, most);
+  for (std::size_t k = 0; k < asked; ++k) {
+    ways[count] = way(k * n / asked);
+    count += isFinite(S(ways[count].squaredNorm())) ? 1U : 0U;
+  }
+  if (count == 0) {
+    return Vector3<S>::Zero();
+  }
+  const auto ranked = [&](std::size_t rank, auto&& numberOf) {
+    for (std::size_t k = 0; k < count; ++k) {
+      numbers[k] = numberOf(ways[k]);
+    }
+    std::nth_element(numbers.data(), numbers.data() + rank, numbers.data() + count);
+    return numbers[rank];
+  };
+  Vector3<S> common;
+  for (int axis = 0; axis < 3; ++axis) {
+    common[axis] = ranked(count / 2, [axis](const Vector3<S>& w) { return w[axis]; });
+  }
+  const std::size_t high = count * 7 / 8;
+  const S whole_sq = ranked(high, [](const Vector3<S>& w) { return S(w.squaredNorm()); });
+  const S rest_sq = ranked(high, [&](const Vector3<S>& w) { return S((w - common).squaredNorm()); });
+  return S(4) * rest_sq < whole_sq ? common : Vector3<S>(Vector3<S>::Zero());
+}
+
+/// The frame that moves with what all bodies have in common, from the last search to the end of their ways.
+template <Real S>
+class CommonMotion {
+ public:
+  /// \param start, end [m] since the last search, before and after the ways
+  void set(const Vector3<S>& start, const Vector3<S>& end) {
+    start_ = start;
+    end_ = end;
+    using std::sqrt;
+    most_ = S(sqrt(std::max<S>(start_.squaredNorm(), end_.squaredNorm())));
+  }
+  void clear() { set(Vector3<S>::Zero(), Vector3<S>::Zero()); }
+
+  const Vector3<S>& start() const { return start_; }
+  const Vector3<S>& end() const { return end_; }
+  /// [m] The longer of both.
+  const S& most() const { return most_; }
+  bool isNone() const { return !(most_ > S(0)); }
+
+  /// `travel` as seen in this frame.
+  template <class Travel>
+  auto lessThis(const Travel& travel) const {
+    if constexpr (std::is_same_v<Travel, AtRest>) {
+      return travel;
+    } else {
+      return [&travel, u = Vector3<S>(end_ - start_)](std::size_t i) -> Vector3<S> {
+        return Vector3<S>(travel(i)) - u;
+      };
+    }
+  }
+
+ private:
+  Vector3<S> start_ = Vector3<S>::Zero();
+  Vector3<S> end_ = Vector3<S>::Zero();
+  S most_ = S(0);
+};
+
+}  // namespace detail
+
+}  // namespace gravel
