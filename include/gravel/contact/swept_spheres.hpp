@@ -30,9 +30,13 @@ class SweptSpheres {
     spheres_.resize(scene.bodies.size());
     common_.setZero();
     if (scene.walls.empty()) {
-      common_ = commonWay<S>(spheres_.size(), [&](std::size_t i) { return velocityOf(scene, i); });
+      common_ = commonWay<S>(spheres_.size(), [&](std::size_t i) {
+        return isMovable(scene.bodies, i) ? Vector3<S>(scene.course.velocity(scene.bodies, i))
+                                          : Vector3<S>(Vector3<S>::Zero());
+      });
     }
-    lost_ = S(8) * roundoff<S>() * safeNorm(common_);
+    lost_ = S(8) * roundoff<S>() * h * safeNorm(common_);
+    standing_ = lost_ + h * safeNorm(common_);
     parallelFor(spheres_.size(), chunk,
                 [&](std::size_t k) { renew(scene, static_cast<std::uint32_t>(k), h); });
     wallWays_.clear();
@@ -44,11 +48,12 @@ class SweptSpheres {
   /// The course of body i is another one now.
   template <class Scene>
   void renew(const Scene& scene, std::uint32_t i, const S& h) {
-    S way = h * (safeNorm(Vector3<S>(velocityOf(scene, i) - common_)) + lost_);
+    S way = standing_;
     if (isMovable(scene.bodies, i)) {
-      way += h * h / S(2) *
-             (sumAbs(Vector3<S>(scene.course.acceleration(scene.bodies, i))) +
-              sumAbs(Vector3<S>(scene.bodies.accelerations()[i])));
+      way = lost_ + h * safeNorm(Vector3<S>(scene.course.velocity(scene.bodies, i) - common_)) +
+            h * h / S(2) *
+                (sumAbs(Vector3<S>(scene.course.acceleration(scene.bodies, i))) +
+                 sumAbs(Vector3<S>(scene.bodies.accelerations()[i])));
     }
     spheres_[i] = {scene.bodies.positions()[i], S(scene.bodies.radii()[i]) + way};
   }
@@ -74,12 +79,6 @@ class SweptSpheres {
  private:
   static constexpr std::size_t chunk = 512;
 
-  template <class Scene>
-  static Vector3<S> velocityOf(const Scene& scene, std::size_t i) {
-    return isMovable(scene.bodies, i) ? Vector3<S>(scene.course.velocity(scene.bodies, i))
-                                      : Vector3<S>(Vector3<S>::Zero());
-  }
-
   /// In double half a cache line.
   struct alignas(alignof(S) > 32 ? alignof(S) : 32) Sphere {
     Vector3<S> x;
@@ -87,7 +86,8 @@ class SweptSpheres {
   };
   std::vector<Sphere> spheres_;
   Vector3<S> common_ = Vector3<S>::Zero();  ///< [m s^-1]
-  S lost_ = S(0);                           ///< [m s^-1] by rounding where it is subtracted
+  S lost_ = S(0);                           ///< [m] by rounding where it is subtracted
+  S standing_ = S(0);                       ///< [m] way of what is fixed
   std::vector<S> wallWays_;                 ///< [m]
 };
 
