@@ -35,7 +35,9 @@ Vector3<S> wayOf(const Travel& travel, std::size_t i) {
 
 /// What n ways have in common, as those of a pile in orbit do: the median of each component among at most 63
 /// of them, evenly spaced; zero unless it leaves of seven in eight at most half as much. The eighth, bullets
-/// or a planet, has no say. Of ways or velocities. O(1). \param way `way(i)`: that of body i
+/// or a planet, has no say. Of ways or velocities. O(1).
+///
+/// \param way `way(i)`: that of body i
 template <Real S, class Way>
 Vector3<S> commonWay(std::size_t n, Way&& way) {
   constexpr std::size_t most = 63;

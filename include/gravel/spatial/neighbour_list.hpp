@@ -162,7 +162,7 @@ class NeighbourList {
     const std::size_t n = places_.size();
     parts_.resize((n + chunk - 1) / chunk);
     parallelForChunks<Share::Alike>(n, chunk, [&](std::size_t begin, std::size_t end) {
-      const auto farthest = [&](std::size_t i) {
+      const auto farthest = [&](std::size_t i) __attribute__((always_inline)) {
         const Vector3<S> x = positions[i];
         const S d_sq = wayFrom_sq(i, x, common_.start());
         if constexpr (std::is_same_v<Travel, AtRest>) {
@@ -248,11 +248,11 @@ class NeighbourList {
     std::nth_element(spheres.begin(), middle, spheres.end());
     const S median = spheres.empty() ? S(0) : *middle;
     using std::sqrt;
-    skin_ = fixedSkin_ ? *fixedSkin_
-                       : detail::skinFor(median,
-                                         motionSeen && moved_sq_ > S(0)
-                                             ? S(S(2) * S(sqrt(moved_sq_)) / S(static_cast<double>(updates_)))
-                                             : S(0));
+    const S perUpdate =
+        motionSeen
+            ? S(S(2) * S(sqrt(moved_sq_)) / S(static_cast<double>(std::max<std::uint64_t>(1, updates_))))
+            : S(0);
+    skin_ = fixedSkin_ ? *fixedSkin_ : detail::skinFor(median, perUpdate);
     swift_.clear();
     flow_ = S(0);
     common_.clear();

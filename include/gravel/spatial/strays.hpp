@@ -1,8 +1,8 @@
 #pragma once
 
 /// \file
-/// What bodies have in common as they move, and those that outrun the skin of a neighbour list: which they
-/// are, and the comparison of one with all others.
+/// Bodies that outrun the skin of a neighbour list: which they are, the comparison of one with all others,
+/// and how its pairs join the list's; and how thick a skin few outrun.
 
 #include <gravel/spatial/common_motion.hpp>
 #include <gravel/spatial/pair.hpp>
