@@ -46,8 +46,9 @@ TEST_CASE("Swept spheres miss no pair that meets, and what all have in common ad
         const Vector3<double> r = bodies.positions()[j] - bodies.positions()[i];
         const Vector3<double> way = h * (velocity(j) - velocity(i));
         const double s = way.squaredNorm() > 0 ? std::clamp(-r.dot(way) / way.squaredNorm(), 0.0, 1.0) : 0.0;
-        Vector3<double> drift;
-        const bool kept = swept.mayMeet(i, j, Domain<double>::open(), 0.0, h, drift);
+        Vector3<double> seen, drift;
+        const bool kept = swept.mayMeet(i, j, Domain<double>::open(), 0.0, h, seen, drift);
+        CHECK((seen == r && drift.isZero(0.0)));
         if ((r + s * way).norm() < bodies.radii()[i] + bodies.radii()[j]) {
           ++met;
           CHECK(kept);

@@ -30,6 +30,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
   using Base::after;
   using Base::bouncesNoMore;
   using Base::flightOf;
+  using Base::flights_;
   using Base::give;
   using Base::history_;
   using Base::impacts_;
@@ -79,7 +80,8 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     predictAll(scene, near.pairs(), nearWalls);
     ImpactReport<S> report;
     if (!queue_.empty()) {
-      Base::prepare(bodies.size(), held);
+      Base::prepare(bodies.size(), near.pairs().size(), held);
+      flights_.forget(bodies.size());
       if (linked_ != near.version() || near.version() == 0 || start_.size() != bodies.size() + 1) {
         link(bodies.size(), near.pairs());
         linked_ = near.version();
@@ -90,6 +92,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
       for (const std::uint32_t i : struck) {
         near.follow(bodies, i, settings.h, late_);
         swept_.renew(scene, i, settings.h);
+        flights_.renew(i);
       }
       for (const std::uint32_t i : struck) {
         predictAgain(scene, near.pairs(), i, now);
@@ -150,8 +153,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
 
   /// Nothing where the two are not near each other any more.
   template <class Scene>
-  [[gnu::always_inline]] static inline std::optional<Meeting> meetingAt(const Scene& scene,
-                                                                        const Event& event) {
+  [[gnu::always_inline]] inline std::optional<Meeting> meetingAt(const Scene& scene, const Event& event) {
     const auto& bodies = scene.bodies;
     const std::uint32_t m1 = bodies.materials()[event.first];
     Meeting at;
@@ -166,9 +168,11 @@ class ImpactEvents : private detail::ImpactCourses<S> {
       at.material = scene.materials.pair(m1, wall.surface, wall.material);
       return at;
     }
-    const RelativeFlight<S> flight = flightOf(scene, event.first, event.second, at.drift);
-    const S r1 = bodies.radii()[event.first];
-    const S r2 = bodies.radii()[event.second];
+    const detail::ImpactFlight<S>& first = flights_.of(scene, event.first);
+    const detail::ImpactFlight<S>& second = flights_.of(scene, event.second);
+    const RelativeFlight<S> flight = flightOf(scene, first, second, at.drift);
+    const S& r1 = first.radius;
+    const S& r2 = second.radius;
     // The normal on the straight way of the drift, a h^2/8 at most from the parabola's: the blow then exerts
     // no torque on the drift's own positions, and keeps its angular momentum to rounding.
     const auto touch = sphereSphere<S>(Vector3<S>(flight.r + flight.v * event.t), r1, r2, event.key1,

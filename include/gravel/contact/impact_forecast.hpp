@@ -4,6 +4,7 @@
 /// Which pairs will touch in a step, and when, kept true while blows change the courses of bodies.
 
 #include <gravel/contact/contact.hpp>
+#include <gravel/contact/impact_flights.hpp>
 #include <gravel/contact/impact_past.hpp>
 #include <gravel/contact/impact_scene.hpp>
 #include <gravel/contact/resting_gap.hpp>
@@ -43,25 +44,25 @@ class ImpactForecast : protected ImpactPast<S> {
   using Base::isListed;
   using Base::leans_;
   using Event = ImpactEvent<S>;
+  using Flight = ImpactFlight<S>;
 
   static bool after(const Event& a, const Event& b) { return comesAfter(a, b); }
 
   static constexpr std::size_t chunk = 1024;
 
-  /// Motion of the second as seen from the first, `drift` of its image included.
+  /// \param drift out: [m s^-1] of the image of the second, which the velocity includes
   template <class Scene>
-  static RelativeFlight<S> flightOf(const Scene& scene, std::uint32_t i, std::uint32_t j, Vector3<S>& drift) {
-    Vector3<S> r = Vector3<S>(scene.bodies.positions()[j]) - Vector3<S>(scene.bodies.positions()[i]);
+  static RelativeFlight<S> flightOf(const Scene& scene, const Flight& one, const Flight& two,
+                                    Vector3<S>& drift) {
+    Vector3<S> r = two.x - one.x;
     drift = Vector3<S>::Zero();
     scene.domain.minimumImage(r, drift, scene.settings.time);
-    return {r, scene.velocity(j) - scene.velocity(i) + drift, scene.acceleration(j) - scene.acceleration(i),
-            scene.settings.h};
+    return relativeFlight(one, two, r, drift, scene.settings.h);
   }
-
   template <class Scene>
-  static RelativeFlight<S> flightOf(const Scene& scene, std::uint32_t i, const HalfSpace<S>& wall) {
-    return {Vector3<S>(scene.bodies.positions()[i]) - wall.offset * wall.normal,
-            scene.velocity(i) - wall.velocity, scene.acceleration(i), scene.settings.h};
+  static RelativeFlight<S> flightOf(const Scene& scene, const Flight& one, const HalfSpace<S>& wall) {
+    return {Vector3<S>(one.x - wall.offset * wall.normal), Vector3<S>(one.v - wall.velocity), one.a,
+            scene.settings.h};
   }
 
   template <class Scene>
@@ -96,13 +97,13 @@ class ImpactForecast : protected ImpactPast<S> {
                                      std::vector<Event>& out) const {
     auto next = scene.held.begin();
     bool placed = false;
-    Vector3<S> drift;
+    Vector3<S> r, drift;
     for (const auto& [i, j] : pairs) {
       if (next != scene.held.end() && next->first == i && next->second == j) {
         ++next;  // most pairs of a heap: both lists are in one order
         continue;
       }
-      if (!swept_.mayMeet(i, j, scene.domain, scene.settings.time, scene.settings.h, drift)) {
+      if (!swept_.mayMeet(i, j, scene.domain, scene.settings.time, scene.settings.h, r, drift)) {
         continue;
       }
       const ContactKeys keys{scene.bodies.ids()[i], scene.bodies.ids()[j]};
@@ -120,8 +121,10 @@ class ImpactForecast : protected ImpactPast<S> {
       if (!detail::canTouch(scene.bodies, i, j)) {
         continue;
       }
-      const S reach = S(scene.bodies.radii()[i]) + S(scene.bodies.radii()[j]);
-      if (const auto t = timeOfImpact<S>(flightOf(scene, i, j, drift), reach, S(0))) {
+      const Flight one = Flight::of(scene, i);
+      const Flight two = Flight::of(scene, j);
+      const auto flight = relativeFlight(one, two, r, drift, scene.settings.h);
+      if (const auto t = timeOfImpact<S>(flight, S(one.radius + two.radius), S(0))) {
         out.push_back({*t, i, j, keys.first, keys.second});
       }
     }
@@ -139,7 +142,8 @@ class ImpactForecast : protected ImpactPast<S> {
       if (!swept_.mayMeet(i, wall, w)) {
         continue;
       }
-      if (const auto t = timeOfImpact<S>(flightOf(scene, i, wall), wall.normal, radius, S(0))) {
+      if (const auto t =
+              timeOfImpact<S>(flightOf(scene, Flight::of(scene, i), wall), wall.normal, radius, S(0))) {
         const std::uint64_t key1 = scene.bodies.ids()[i];
         const std::uint64_t key2 = boundaryKey(wall.number);
         const auto held = placeOf(scene.held, {key1, key2}, place);
@@ -175,54 +179,57 @@ class ImpactForecast : protected ImpactPast<S> {
       return;
     }
     for (std::uint32_t k = start_[body]; k < start_[body + 1]; ++k) {
-      predict(scene, pairs[ofBody_[k]], from);
+      predict(scene, pairs[ofBody_[k]], from, ofBody_[k]);
     }
     for (const Pair& pair : late_) {
       if (pair.first == body || pair.second == body) {
-        predict(scene, pair, from);
+        predict(scene, pair, from, Base::noPair);
       }
     }
-    const S radius = scene.bodies.radii()[body];
-    const bool meets = radius > S(0) && detail::isMovable(scene.bodies, body);
+    const Flight& one = flights_.of(scene, body);
+    const bool meets = one.radius > S(0) && one.movable;
     for (std::uint32_t w = 0; meets && w < scene.walls.size(); ++w) {
       const HalfSpace<S>& wall = scene.walls[w];
       if (!swept_.mayMeet(body, wall, w)) {
         continue;
       }
-      const RelativeFlight<S> flight = flightOf(scene, body, wall);
+      const RelativeFlight<S> flight = flightOf(scene, one, wall);
       const std::uint64_t key1 = scene.bodies.ids()[body];
       const std::uint64_t key2 = boundaryKey(scene.walls[w].number);
       if (isHeld(scene, body, staticPartner, {key1, key2})) {
-        const S gap = wall.normal.dot(flight.place(from)) - radius;
-        if (isDriven(scene, body, staticPartner, gap, radius, S(-wall.normal.dot(flight.velocity(from))),
+        const S gap = wall.normal.dot(flight.place(from)) - one.radius;
+        if (isDriven(scene, body, staticPartner, gap, one.radius, S(-wall.normal.dot(flight.velocity(from))),
                      wall.normal)) {
           schedule({from, body, staticPartner, key1, key2, 0, 0, w});
         }
-      } else if (const auto t = timeOfImpact<S>(flight, wall.normal, radius, from)) {
+      } else if (const auto t = timeOfImpact<S>(flight, wall.normal, one.radius, from)) {
         schedule({*t, body, staticPartner, key1, key2, 0, 0, w});
       }
     }
   }
 
+  /// \param number  of the pair in the list, or none
   template <class Scene>
-  void predict(const Scene& scene, const Pair& pair, const S& from) {
+  [[gnu::flatten]] void predict(const Scene& scene, const Pair& pair, const S& from, std::size_t number) {
     const auto& [i, j] = pair;
-    Vector3<S> drift;
-    if (!swept_.mayMeet(i, j, scene.domain, scene.settings.time, scene.settings.h, drift) ||
-        isLeftToSolver(scene, i) || isLeftToSolver(scene, j) || !detail::canTouch(scene.bodies, i, j)) {
+    Vector3<S> r, drift;
+    if (!swept_.mayMeet(i, j, scene.domain, scene.settings.time, scene.settings.h, r, drift) ||
+        isLeftToSolver(scene, i) || isLeftToSolver(scene, j)) {
       return;
     }
-    const RelativeFlight<S> flight = flightOf(scene, i, j, drift);
-    const S reach = S(scene.bodies.radii()[i]) + S(scene.bodies.radii()[j]);
+    const Flight& one = flights_.of(scene, i);
+    const Flight& two = flights_.of(scene, j);
     const std::uint64_t key1 = scene.bodies.ids()[i];
     const std::uint64_t key2 = scene.bodies.ids()[j];
-    if (isDecided(i, key2)) {
+    if (!canTouch(one, two) || isDecided(i, key2)) {
       return;
     }
-    if (isHeld(scene, i, j, {key1, key2})) {
-      const Vector3<S> r = flight.place(from);
-      const S distance = detail::safeNorm(r);
-      const Vector3<S> n = detail::safeUnit(r);
+    const RelativeFlight<S> flight = relativeFlight(one, two, r, drift, scene.settings.h);
+    const S reach = one.radius + two.radius;
+    if (isHeld(scene, i, j, {key1, key2}, number)) {
+      const Vector3<S> apart = flight.place(from);
+      const S distance = detail::safeNorm(apart);
+      const Vector3<S> n = detail::safeUnit(apart);
       if (isDriven(scene, i, j, S(distance - reach), reach, S(-n.dot(flight.velocity(from))), n)) {
         schedule({from, i, j, key1, key2});
       }
@@ -241,7 +248,7 @@ class ImpactForecast : protected ImpactPast<S> {
   /// Whether blows have set a body free that leans on others: what bears it and what lies on it opens at
   /// `from`, faster than it falls by in a step; what touches its sides does not count.
   template <class Scene>
-  bool isSetFree(const Scene& scene, std::span<const Pair> pairs, std::uint32_t body, const S& from) const {
+  bool isSetFree(const Scene& scene, std::span<const Pair> pairs, std::uint32_t body, const S& from) {
     const Vector3<S> support = scene.supportOf(body);
     if (leans_[body] == 0 || support == Vector3<S>::Zero()) {
       return false;
@@ -256,11 +263,13 @@ class ImpactForecast : protected ImpactPast<S> {
     };
     for (std::uint32_t k = start_[body]; k < start_[body + 1]; ++k) {
       const auto& [i, j] = pairs[ofBody_[k]];
-      if (isListed(scene.held, {scene.bodies.ids()[i], scene.bodies.ids()[j]})) {
+      if (isListed(scene.held, {scene.bodies.ids()[i], scene.bodies.ids()[j]}, ofBody_[k])) {
+        const Flight& one = flights_.of(scene, i);
+        const Flight& two = flights_.of(scene, j);
         Vector3<S> drift;
-        const RelativeFlight<S> flight = flightOf(scene, i, j, drift);
+        const RelativeFlight<S> flight = flightOf(scene, one, two, drift);
         const Vector3<S> r = flight.place(from);
-        const S reach = S(scene.bodies.radii()[i]) + S(scene.bodies.radii()[j]);
+        const S reach = one.radius + two.radius;
         if (!(detail::safeNorm(r) <= reach * (S(1) + detail::restingMargin<S>()))) {
           continue;  // moved apart by overlaps with others: it bears nothing, and is not in every list
         }
@@ -272,7 +281,8 @@ class ImpactForecast : protected ImpactPast<S> {
     }
     for (const HalfSpace<S>& wall : scene.walls) {
       if (isListed(scene.held, {scene.bodies.ids()[body], boundaryKey(wall.number)}) &&
-          holds(wall.normal, wall.normal.dot(flightOf(scene, body, wall).velocity(from)))) {
+          holds(wall.normal,
+                wall.normal.dot(flightOf(scene, flights_.of(scene, body), wall).velocity(from)))) {
         return false;
       }
     }
@@ -290,12 +300,16 @@ class ImpactForecast : protected ImpactPast<S> {
       return k != staticPartner && isMovable(scene.bodies, k) &&
              history_[k].impacts >= scene.settings.mostSlow;
     };
+    if (!(gap <= reach / S(1000) && u > scene.settings.restitutionThreshold)) {
+      return false;
+    }
     const S fall = isOften(i) && isOften(j) ? S(scene.fallOf(i) + scene.fallOf(j)) : scene.heldAlong(i, j, n);
-    return gap <= reach / S(1000) && u > fall * scene.settings.h + scene.settings.restitutionThreshold;
+    return u > fall * scene.settings.h + scene.settings.restitutionThreshold;
   }
 
   std::vector<Event> queue_;
   SweptSpheres<S> swept_;
+  ImpactFlights<S> flights_;
   std::vector<std::vector<Event>> parts_;
   std::uint64_t linked_ = 0;
   std::vector<std::uint32_t> start_;

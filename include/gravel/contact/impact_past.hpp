@@ -20,6 +20,8 @@ class ImpactPast {
   using History = ImpactHistory<S>;
 
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+  static constexpr std::size_t noPair = std::numeric_limits<std::size_t>::max();
+  enum class Listed : unsigned char { Unknown, No, Yes };
 
   /// A new step: nothing has happened.
   void forget() {
@@ -34,9 +36,10 @@ class ImpactPast {
     merges_.clear();
   }
 
-  /// For the impacts of so many bodies.
-  void prepare(std::size_t count, std::span<const ContactName> held) {
+  /// For the impacts of so many bodies, of which so many pairs may meet.
+  void prepare(std::size_t count, std::size_t pairs, std::span<const ContactName> held) {
     history_.resize(count);
+    listed_.assign(pairs, Listed::Unknown);
     leans_.assign(count, 0);
     for (const ContactName& c : held) {
       leans_[c.first] = 1;
@@ -70,6 +73,19 @@ class ImpactPast {
     return found != names.end() && found->keys == keys;
   }
 
+  /// The same for pair number `pair` of the candidates: looked up once in a step. Those that came later have
+  /// no number below that of prepare().
+  bool isListed(std::span<const ContactName> names, const ContactKeys& keys, std::size_t pair) {
+    if (pair >= listed_.size()) {
+      return isListed(names, keys);
+    }
+    Listed& known = listed_[pair];
+    if (known == Listed::Unknown) {
+      known = isListed(names, keys) ? Listed::Yes : Listed::No;
+    }
+    return known == Listed::Yes;
+  }
+
   /// Whether somebody else has decided about the pair in this step, and not that they part.
   bool isDecided(std::uint32_t first, std::uint64_t key2) const {
     for (std::uint32_t k = history_[first].rests; k != none; k = earlier_[k]) {
@@ -91,13 +107,15 @@ class ImpactPast {
   }
 
   /// Solved together with others, and neither was let go since; or brought to rest in this step.
+  /// \param pair  its number among the candidates, if it is one
   template <class Scene>
-  bool isHeld(const Scene& scene, std::uint32_t first, std::uint32_t second, const ContactKeys& keys) const {
+  bool isHeld(const Scene& scene, std::uint32_t first, std::uint32_t second, const ContactKeys& keys,
+              std::size_t pair = noPair) {
     if (isAtRest(first, keys.second)) {
       return true;
     }
     return !scene.isFree(first) && !(second != staticPartner && scene.isFree(second)) &&
-           isListed(scene.held, keys);
+           isListed(scene.held, keys, pair);
   }
 
   /// It does not bounce any more.
@@ -141,6 +159,7 @@ class ImpactPast {
 
   std::vector<History> history_;
   std::vector<unsigned char> leans_;     ///< bodies with a contact that is held
+  std::vector<Listed> listed_;           ///< among what is held, by pair
   ContactIslands islands_;               ///< of what is held
   std::vector<unsigned char> anchored_;  ///< by the body that an island is named by
   bool islandsKnown_ = false;

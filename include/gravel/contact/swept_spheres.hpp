@@ -58,10 +58,11 @@ class SweptSpheres {
     spheres_[i] = {scene.bodies.positions()[i], S(scene.bodies.radii()[i]) + way};
   }
 
-  /// \param drift out: [m s^-1] of the image of the second  \param time [s]  \param h [s]
+  /// \param time [s]  \param h [s]
+  /// \param r, drift  out: [m] from the first to the nearest image of the second, [m s^-1] of that image
   [[gnu::always_inline]] bool mayMeet(std::uint32_t i, std::uint32_t j, const Domain<S>& domain,
-                                      const S& time, const S& h, Vector3<S>& drift) const {
-    Vector3<S> r = spheres_[j].x - spheres_[i].x;
+                                      const S& time, const S& h, Vector3<S>& r, Vector3<S>& drift) const {
+    r = spheres_[j].x - spheres_[i].x;
     S far = spheres_[i].reach + spheres_[j].reach;
     drift = Vector3<S>::Zero();
     if (!domain.isOpen()) {

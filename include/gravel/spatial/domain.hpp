@@ -15,7 +15,7 @@ namespace detail {
 template <Real S>
 inline S nearestInteger(const S& x) {
   if constexpr (std::is_floating_point_v<S>) {
-    return std::round(x);
+    return x < S(0.5) && x > S(-0.5) ? S(x * S(0)) : std::round(x);  // most: a call saved, the same sign
   } else {
     // Written with comparisons alone: a user's scalar need not have round(). Exact for |x| < 2^53.
     const bool negative = x < S(0);
