@@ -92,7 +92,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
       for (const std::uint32_t i : struck) {
         near.follow(bodies, i, settings.h, late_);
         swept_.renew(scene, i, settings.h);
-        flights_.renew(i);
+        flights_.renew(scene, i);
       }
       for (const std::uint32_t i : struck) {
         predictAgain(scene, near.pairs(), i, now);
@@ -168,8 +168,8 @@ class ImpactEvents : private detail::ImpactCourses<S> {
       at.material = scene.materials.pair(m1, wall.surface, wall.material);
       return at;
     }
-    const detail::ImpactFlight<S>& first = flights_.of(scene, event.first);
-    const detail::ImpactFlight<S>& second = flights_.of(scene, event.second);
+    const detail::ImpactFlight<S> first = flights_.of(scene, event.first);
+    const detail::ImpactFlight<S> second = flights_.of(scene, event.second);
     const RelativeFlight<S> flight = flightOf(scene, first, second, at.drift);
     const S& r1 = first.radius;
     const S& r2 = second.radius;

@@ -5,8 +5,10 @@
 
 #include <gravel/contact/contact_bodies.hpp>
 #include <gravel/contact/time_of_impact.hpp>
+#include <gravel/core/memory.hpp>
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace gravel::detail {
@@ -42,30 +44,38 @@ template <Real S>
 }
 
 /// Flights found once and kept while nothing happens to the body: in a dense flow each is asked for dozens of
-/// times between two blows.
+/// times between two blows. Only of those that are asked for, which are few in a heap at rest.
 template <Real S>
 class ImpactFlights {
  public:
   /// A new step of so many bodies. O(N).
   void forget(std::size_t count) {
-    known_.assign(count, 0);
-    flights_.resize(count);
+    place_.assign(count, none);
+    clearSpare(flights_);
   }
-  /// The course of body i is another one now.
-  void renew(std::uint32_t i) { known_[i] = 0; }
 
   template <class Scene>
-  [[gnu::always_inline]] const ImpactFlight<S>& of(const Scene& scene, std::uint32_t i) const {
-    if (known_[i] == 0) {
-      flights_[i] = ImpactFlight<S>::of(scene, i);
-      known_[i] = 1;
+  [[gnu::always_inline]] ImpactFlight<S> of(const Scene& scene, std::uint32_t i) {
+    if (place_[i] == none) {
+      place_[i] = static_cast<std::uint32_t>(flights_.size());
+      flights_.push_back(ImpactFlight<S>::of(scene, i));
     }
-    return flights_[i];
+    return flights_[place_[i]];
+  }
+
+  /// The course of body i is another one now.
+  template <class Scene>
+  void renew(const Scene& scene, std::uint32_t i) {
+    if (place_[i] != none) {
+      flights_[place_[i]] = ImpactFlight<S>::of(scene, i);
+    }
   }
 
  private:
-  mutable std::vector<ImpactFlight<S>> flights_;
-  mutable std::vector<unsigned char> known_;
+  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+
+  std::vector<std::uint32_t> place_;  ///< by body
+  std::vector<ImpactFlight<S>> flights_;
 };
 
 }  // namespace gravel::detail

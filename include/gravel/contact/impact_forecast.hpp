@@ -186,7 +186,7 @@ class ImpactForecast : protected ImpactPast<S> {
         predict(scene, pair, from, Base::noPair);
       }
     }
-    const Flight& one = flights_.of(scene, body);
+    const Flight one = flights_.of(scene, body);
     const bool meets = one.radius > S(0) && one.movable;
     for (std::uint32_t w = 0; meets && w < scene.walls.size(); ++w) {
       const HalfSpace<S>& wall = scene.walls[w];
@@ -217,8 +217,8 @@ class ImpactForecast : protected ImpactPast<S> {
         isLeftToSolver(scene, i) || isLeftToSolver(scene, j)) {
       return;
     }
-    const Flight& one = flights_.of(scene, i);
-    const Flight& two = flights_.of(scene, j);
+    const Flight one = flights_.of(scene, i);
+    const Flight two = flights_.of(scene, j);
     const std::uint64_t key1 = scene.bodies.ids()[i];
     const std::uint64_t key2 = scene.bodies.ids()[j];
     if (!canTouch(one, two) || isDecided(i, key2)) {
@@ -264,8 +264,8 @@ class ImpactForecast : protected ImpactPast<S> {
     for (std::uint32_t k = start_[body]; k < start_[body + 1]; ++k) {
       const auto& [i, j] = pairs[ofBody_[k]];
       if (isListed(scene.held, {scene.bodies.ids()[i], scene.bodies.ids()[j]}, ofBody_[k])) {
-        const Flight& one = flights_.of(scene, i);
-        const Flight& two = flights_.of(scene, j);
+        const Flight one = flights_.of(scene, i);
+        const Flight two = flights_.of(scene, j);
         Vector3<S> drift;
         const RelativeFlight<S> flight = flightOf(scene, one, two, drift);
         const Vector3<S> r = flight.place(from);
