@@ -404,6 +404,36 @@ TEST_CASE("What the blows of one moment bring back to rest on its floor stays th
   CHECK(space.body(1).velocity()[2] > 0);
 }
 
+// Who is held is looked up once a step, for pairs that blows make one look at. Seen to fail: where what was
+// found in an earlier step counted, the struck ball sank into the other one by 0.026.
+TEST_CASE("A pair that was held in an earlier step meets when a blow drives it together in this one") {
+  SimulationConfig<double> config = plain(0.05);
+  config.coeffRestitution = 0.5;
+  Space<double> space(config);
+  space.setUniformField({0, 0, -1});
+  Body<double> base = ball({0, 0, 0}, {0, 0, 0}, 1);
+  base.fixed = true;
+  space.addBody(base);
+  space.addBody(ball({0, 0, 2}, {0, 0, 0}, 1));
+  space.addBody(ball({0, 0, 4.15}, {0, 0, -1}, 1));
+  std::size_t blows = 0;
+  for (int k = 0; k < 4; ++k) {
+    space.computeDynamics(space.steps());
+    blows += space.contactReport().impacts;
+  }
+  REQUIRE(blows > 0);
+  space.body(1).position() = Vec(0, 0, 2.05);
+  space.body(1).velocity() = Vec(0, 0, 0);
+  space.body(2).position() = Vec(0, 0, 4.2);
+  space.body(2).velocity() = Vec(0, 0, -5);
+  space.computeDynamics(space.steps());
+  const auto struck = space.impacts();
+  REQUIRE(struck.size() >= 2);
+  CHECK(struck[0].key1 == 1);
+  CHECK(struck[1].key1 == 0);
+  CHECK(space.body(1).position()[2] >= 2 - 1e-14);
+}
+
 // Two balls rest on each other by their own gravity; a third strikes one off. Seen to fail: let go without a
 // push back on the other one, the sum of momenta changed by m a (t - h/2), 1.2e-3 here.
 TEST_CASE("A blow that parts a pile in space keeps momentum and the centre of mass") {
