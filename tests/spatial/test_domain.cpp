@@ -202,3 +202,13 @@ TEST_CASE("rounding to the nearest integer without a round() of the scalar's own
     CHECK(detail::nearestInteger(MinimalReal(x)).inTest() == std::round(x));
   }
 }
+
+TEST_CASE("rounding to the nearest integer without a call where that is zero agrees with std::round") {
+  for (const double size : {0.0, 1e-300, 0.3, 0.49999999999999994, 0.5, 0.7, 1.5, 4503599627370497.5}) {
+    for (const double x : {size, -size}) {
+      CHECK(detail::nearestInteger(x) == std::round(x));
+      CHECK(std::signbit(detail::nearestInteger(x)) == std::signbit(x));
+    }
+  }
+  CHECK(std::isnan(detail::nearestInteger(std::nan(""))));
+}

@@ -3,7 +3,6 @@
 /// \file
 /// How bodies fly between two blows of theirs.
 
-#include <gravel/contact/contact_bodies.hpp>
 #include <gravel/contact/time_of_impact.hpp>
 #include <gravel/core/memory.hpp>
 
@@ -13,24 +12,17 @@
 
 namespace gravel::detail {
 
-/// The course of a body, and what decides whom it can touch.
+/// The course of a body, and its size.
 template <Real S>
 struct ImpactFlight {
   Vector3<S> x;  ///< [m] at the start of the step
   Vector3<S> v;  ///< [m s^-1] mean of the drift
   Vector3<S> a;  ///< [m s^-2] with what holds it
   S radius;      ///< [m]
-  bool movable;
-  bool tracer;
 
   template <class Scene>
   [[gnu::always_inline]] static inline ImpactFlight of(const Scene& scene, std::uint32_t i) {
-    return {scene.bodies.positions()[i], scene.velocity(i),          scene.acceleration(i),
-            scene.bodies.radii()[i],     isMovable(scene.bodies, i), isTracer(scene.bodies, i)};
-  }
-
-  friend bool canTouch(const ImpactFlight& one, const ImpactFlight& two) {
-    return !one.tracer && !two.tracer && (one.movable || two.movable);
+    return {scene.bodies.positions()[i], scene.velocity(i), scene.acceleration(i), scene.bodies.radii()[i]};
   }
 };
 

@@ -187,7 +187,7 @@ class ImpactForecast : protected ImpactPast<S> {
       }
     }
     const Flight one = flights_.of(scene, body);
-    const bool meets = one.radius > S(0) && one.movable;
+    const bool meets = one.radius > S(0) && detail::isMovable(scene.bodies, body);
     for (std::uint32_t w = 0; meets && w < scene.walls.size(); ++w) {
       const HalfSpace<S>& wall = scene.walls[w];
       if (!swept_.mayMeet(body, wall, w)) {
@@ -214,16 +214,16 @@ class ImpactForecast : protected ImpactPast<S> {
     const auto& [i, j] = pair;
     Vector3<S> r, drift;
     if (!swept_.mayMeet(i, j, scene.domain, scene.settings.time, scene.settings.h, r, drift) ||
-        isLeftToSolver(scene, i) || isLeftToSolver(scene, j)) {
+        isLeftToSolver(scene, i) || isLeftToSolver(scene, j) || !detail::canTouch(scene.bodies, i, j)) {
+      return;
+    }
+    const std::uint64_t key1 = scene.bodies.ids()[i];
+    const std::uint64_t key2 = scene.bodies.ids()[j];
+    if (isDecided(i, key2)) {
       return;
     }
     const Flight one = flights_.of(scene, i);
     const Flight two = flights_.of(scene, j);
-    const std::uint64_t key1 = scene.bodies.ids()[i];
-    const std::uint64_t key2 = scene.bodies.ids()[j];
-    if (!canTouch(one, two) || isDecided(i, key2)) {
-      return;
-    }
     const RelativeFlight<S> flight = relativeFlight(one, two, r, drift, scene.settings.h);
     const S reach = one.radius + two.radius;
     if (isHeld(scene, i, j, {key1, key2}, number)) {

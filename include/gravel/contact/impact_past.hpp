@@ -73,8 +73,8 @@ class ImpactPast {
     return found != names.end() && found->keys == keys;
   }
 
-  /// The same for pair number `pair` of the candidates: looked up once in a step. Those that came later have
-  /// no number below that of prepare().
+  /// The same for pair number `pair` of the candidates: looked up once in a step. Pairs that came in it have
+  /// no number.
   bool isListed(std::span<const ContactName> names, const ContactKeys& keys, std::size_t pair) {
     if (pair >= listed_.size()) {
       return isListed(names, keys);
