@@ -8,7 +8,7 @@ using gravel::detail::resizeAnew;
 using gravel::detail::resizeSparingly;
 
 // Seen to fail: plain resize, which doubles; room for the size alone, where each new length moves all.
-TEST_CASE("a workspace that grows by one at a time has an eighth to spare at most, and seldom moves") {
+TEST_CASE("a workspace that grows by one at a time has a thirty-second to spare at most, and seldom moves") {
   std::vector<int> v;
   std::size_t moves = 0;
   for (std::size_t n = 1; n <= 100000; ++n) {
@@ -16,10 +16,10 @@ TEST_CASE("a workspace that grows by one at a time has an eighth to spare at mos
     resizeSparingly(v, n);
     v.back() = static_cast<int>(n);
     REQUIRE(v.size() == n);
-    REQUIRE(v.capacity() <= n + n / 8 + 1);
+    REQUIRE(v.capacity() <= n + n / 32 + 1);
     moves += v.data() != before ? 1 : 0;
   }
-  CHECK(moves < 120);  // 8 up to 8, then log(100000 / 8) / log(9 / 8) = 80
+  CHECK(moves < 350);  // 32 up to 32, then log(100000 / 32) / log(33 / 32) = 262, and some by rounding
   std::vector<int> counted(v.size());
   std::iota(counted.begin(), counted.end(), 1);
   CHECK(v == counted);

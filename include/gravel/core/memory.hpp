@@ -8,12 +8,18 @@
 
 namespace gravel::detail {
 
-/// v.resize(n) that leaves room for an eighth more where it has to grow, not for as many again: lists by
-/// contact are the most of a heap's memory, and their length hardly changes.
+/// Gives all of it back.
+template <class T>
+void release(std::vector<T>& v) {
+  std::vector<T>().swap(v);
+}
+
+/// v.resize(n) that leaves room for a thirty-second more where it has to grow, not for as many again: lists
+/// by contact are the most of a heap's memory, and their length hardly changes.
 template <class T>
 void resizeSparingly(std::vector<T>& v, std::size_t n) {
   if (n > v.capacity()) {
-    v.reserve(n + n / 8);
+    v.reserve(n + n / 32);
   }
   v.resize(n);
 }
@@ -22,7 +28,7 @@ void resizeSparingly(std::vector<T>& v, std::size_t n) {
 template <class T>
 void resizeAnew(std::vector<T>& v, std::size_t n) {
   if (n > v.capacity()) {
-    std::vector<T>().swap(v);
+    release(v);
   }
   resizeSparingly(v, n);
 }
@@ -33,7 +39,7 @@ template <class T>
 void clearSpare(std::vector<T>& v) {
   constexpr std::size_t harmless = 1024;
   if (v.capacity() > 4 * v.size() + harmless) {
-    std::vector<T>().swap(v);
+    release(v);
   } else {
     v.clear();
   }

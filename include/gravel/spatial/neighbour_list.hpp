@@ -218,10 +218,8 @@ class NeighbourList {
 
   template <class Ids>
   void join(const Ids& ids) {
-    if (!extra_.empty()) {
-      ++version_;
-      detail::join(pairs_, extra_, ids, joined_);
-    }
+    version_ += extra_.empty() ? 0U : 1U;
+    detail::join(pairs_, extra_, ids, joined_);
   }
 
   template <class Positions, class Radii, class Ids, class Travel>

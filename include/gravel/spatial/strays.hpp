@@ -4,6 +4,7 @@
 /// Bodies that outrun the skin of a neighbour list: which they are, the comparison of one with all others,
 /// and how its pairs join the list's; and how thick a skin few outrun.
 
+#include <gravel/core/memory.hpp>
 #include <gravel/spatial/common_motion.hpp>
 #include <gravel/spatial/pair.hpp>
 
@@ -152,10 +153,15 @@ S takeSwift(std::size_t n, std::size_t most, const S& skin, const Travel& travel
   return enough;
 }
 
-/// `pairs` and `extra`, which is left sorted and without doubles, in one list, in the order of ids.
+/// `pairs` and `extra`, which is left sorted and without doubles, in one list, in the order of ids; without
+/// extra ones it takes no room.
 template <class Ids>
 void join(const std::vector<Pair>& pairs, std::vector<Pair>& extra, const Ids& ids,
           std::vector<Pair>& joined) {
+  if (extra.empty()) {
+    release(joined);
+    return;
+  }
   const auto keys = [&](const Pair& pair) {
     return std::pair(idKey(ids[pair.first]), idKey(ids[pair.second]));
   };
