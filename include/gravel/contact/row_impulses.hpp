@@ -19,11 +19,13 @@ struct RowImpulses {
   struct Progress {
     S change_sq = S(0);
     S size = S(0);
+    S along = S(0);           ///< the same product of these changes and the steps of the sweep before
     std::size_t changed = 0;  ///< rows by more than they may
     std::size_t looked = 0;   ///< rows that were not passed over
     Progress& operator+=(const Progress& other) {
       change_sq = std::max<S>(change_sq, other.change_sq);
       size += other.size;
+      along += other.along;
       changed += other.changed;
       looked += other.looked;
       return *this;
@@ -67,20 +69,22 @@ struct RowImpulses {
     return {changes.du.squaredNorm()[0]};
   }
 
-  /// Resistance to rolling and spinning of a row for its normal impulse.
-  static Progress resist(ContactProblem<S>& problem, std::size_t k, Body& b1, Body& b2) {
+  /// Resistance to rolling and spinning of a row for its normal impulse, first on by `beta` of its last step.
+  static Progress resist(ContactProblem<S>& problem, std::size_t k, Body& b1, Body& b2, const S& beta) {
     TurningRow<S>& row = problem.turning[k];
     if (!(row.mass > S(0))) {
       return {};
     }
+    row.l += beta * row.step;
     const Vector3<S> l = resistTurning<S>(Vector3<S>(row.l - row.mass * row.rho(b1, b2)), problem.rows[k].n,
                                           problem.impulses().normal(k), row.rolling, row.spinning);
     const Vector3<S> dl = l - row.l;
     row.l = l;
-    row.step += dl;
     turn(row, b1, b2, dl);
     const Vector3<S> change = dl / row.mass;
-    return {change.squaredNorm(), change.dot(dl)};
+    const S along = change.dot(row.step);
+    row.step = beta * row.step + dl;
+    return {change.squaredNorm(), change.dot(dl), along};
   }
 
   /// Takes down how far bodies were moved at most.
@@ -102,9 +106,7 @@ struct RowImpulses {
       Body& b1 = problem.bodies[group.slot1[lane]];
       Body& b2 = problem.bodies[group.slot2[lane]];
       TurningRow<S>& row = problem.turning[k];
-      row.step *= Watched ? S(0) : beta;
-      row.l += row.step;
-      const Progress resisted = resist(problem, k, b1, b2);
+      const Progress resisted = resist(problem, k, b1, b2, Watched ? S(0) : beta);
       if constexpr (Watched) {
         const S l = row.mass * S(sqrt(resisted.change_sq));
         if (b1.inverseMass > S(0)) {

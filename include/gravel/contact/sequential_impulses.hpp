@@ -17,10 +17,15 @@ namespace gravel {
 /// Comput. 26, 893). A column of 30 takes some 140 sweeps in place of 2300, and a heavy ball on light ones
 /// stands, where sweeps without it pass on only a part of the weight in a step. Rejected: Nesterov's momentum
 /// (k/(k + 3), started anew when a sweep turns back), by which stacks of mass ratio 1000 sink 4 times as
-/// deep. Sweeps have the last word: results obey the cone. Where the first sweep changes few contacts, as in
-/// a heap at rest with some rattlers, the next ones look only at those that have moved since by more than
-/// half of what ends the sweeps, and go without momentum, until they have looked at as many contacts as there
-/// are. Shares the contacts of a large colour between threads; the same bits for any number of threads.
+/// deep. Sweeps have the last word: results obey the cone. Friction that loads another contact, which then
+/// takes load off this one, makes sweeps turn back: of a ball that spins between a floor and a wall each
+/// leaves -mu^2 times the error of the one before. Momentum would let that grow. So after a sweep without it
+/// that turns back on the step before the next one goes without it, too. If that one turns back as well, to
+/// -r of the step, the impulses go back by r/(1 + r) of its own, to the sum of that series (Aitken's
+/// extrapolation; between the two, so within the cone). Where the first sweep changes few contacts, as in a
+/// heap at rest with some rattlers, the next ones look only at those that have moved since by more than half
+/// of what ends the sweeps, and go without momentum, until they have looked at as many contacts as there are.
+/// Shares the contacts of a large colour between threads; the same bits for any number of threads.
 /// O(contacts) a sweep.
 template <Real S>
 class SequentialImpulses : private detail::RowImpulses<S> {
@@ -81,6 +86,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     bool watched = true;  // all that moves bodies
     S beta = S(0);        // what a sweep begins with: this share of the step of the one before
     S before = S(0);      // square of the changes of that
+    bool bare = false;    // that one had no share
     while (true) {
       const bool alone = local || report.iterations == 0 || !accelerate;  // without momentum
       const Progress now = sweep(problem, colouring, local, alone, beta);
@@ -111,9 +117,9 @@ class SequentialImpulses : private detail::RowImpulses<S> {
         begin(problem);
         before = more ? S(0) : now.size;
       } else if (accelerate) {
-        // At high mass ratios changes fall by less than their rounding: that is no reason to begin anew.
-        const bool falls = !more && now.size < S(1.001) * before;
-        beta = falls ? std::min<S>(S(1), now.size / before) : S(0);
+        const S next = more ? S(0) : shareAfter(now, before, beta, bare);
+        bare = !more && beta == S(0);
+        beta = next;
         before = more ? S(0) : now.size;
         coast(problem, beta);
       }
@@ -123,6 +129,20 @@ class SequentialImpulses : private detail::RowImpulses<S> {
  private:
   static constexpr std::size_t chunk = 512;
   static constexpr std::size_t few = 8;  ///< one contact in so many
+
+  /// The share of a sweep's step with which the next one begins.
+  /// \param beta  the sweep's own \param before  square of the changes of the one before
+  /// \param bare  that one had no share
+  static S shareAfter(const Progress& now, const S& before, const S& beta, bool bare) {
+    if (beta < S(0)) {
+      return S(0);  // to see whether sweeps still turn back
+    }
+    if (beta == S(0) && now.along < S(0)) {
+      return bare ? S(now.along / (before - now.along)) : S(0);
+    }
+    // At high mass ratios changes fall by less than their rounding: that is no reason to begin anew.
+    return now.size < S(1.001) * before ? std::min<S>(S(1), now.size / before) : S(0);
+  }
 
   /// A body's velocities at the end of the last sweep.
   struct BodySwept {
@@ -206,7 +226,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
           detail::maxAbs(b1.s) + detail::maxAbs(b2.s) + detail::maxAbs(b1.v) + detail::maxAbs(b2.v);
       const S enough = Eigen::NumTraits<S>::epsilon() * speed;
       for (int turn = 0; turn < 200; ++turn) {
-        Progress progress = resist(problem, k, b1, b2);
+        Progress progress = resist(problem, k, b1, b2, S(0));
         if (row.stick > S(0)) {
           progress += rub(problem, colouring, k);
         }
@@ -246,11 +266,11 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     Lanes row = problem.load(group, !problem.passes);
     auto b1 = detail::BodyLanes<S>::load(problem.bodies, group.slot1);
     auto b2 = detail::BodyLanes<S>::load(problem.bodies, group.slot2);
-    StepLanes step;
+    StepLanes step, last;
     if constexpr (!Watched) {
-      step = loadStep(group);
-      step.n = Pack::all(beta) * step.n;
-      step.t = Pack::all(beta) * step.t;
+      last = loadStep(group);
+      step.n = Pack::all(beta) * last.n;
+      step.t = Pack::all(beta) * last.t;
       row.jn = row.jn + step.n;
       row.jt = row.jt + step.t;
     }
@@ -272,6 +292,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     progress.change_sq = change_sq.largest();
     progress.size = (changes.dj * changes.approach + changes.dt.dot(changes.du)).sum();
     if constexpr (!Watched) {
+      progress.along = (last.n * changes.approach + last.t.dot(changes.du)).sum();
       storeStep(group, step);
     } else {
       const Pack push_t = changes.dt.sumAbs();  // |its part across n|, or more
