@@ -56,7 +56,7 @@ namespace detail {
 
 /// True for a body that contacts can move: not fixed, not asleep, and with a mass.
 template <class B>
-bool isMovable(const B& bodies, std::size_t i) {
+[[gnu::always_inline]] inline bool isMovable(const B& bodies, std::size_t i) {
   using S = std::remove_cvref_t<decltype(bodies.masses()[i])>;
   return (bodies.flags()[i] & heldFlags) == 0 && bodies.masses()[i] > S(0);
 }
@@ -77,7 +77,7 @@ auto spinOf(const B& bodies, std::size_t i) {
 
 /// True for a point without mass, which feels gravity and touches nothing.
 template <class B>
-bool isTracer(const B& bodies, std::size_t i) {
+[[gnu::always_inline]] inline bool isTracer(const B& bodies, std::size_t i) {
   using S = std::remove_cvref_t<decltype(bodies.masses()[i])>;
   return (bodies.flags()[i] & static_cast<std::uint32_t>(BodyFlag::Fixed)) == 0 &&
          !(bodies.masses()[i] > S(0));

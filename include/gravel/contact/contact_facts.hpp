@@ -106,7 +106,8 @@ S smallerRadius(const Contact<S>& c, const B& bodies) {
 
 /// Whether contact k of a list has the name that stands there in another one.
 template <Real S>
-bool isNamed(std::span<const ContactName> names, std::size_t k, const Contact<S>& c) {
+[[gnu::always_inline]] inline bool isNamed(std::span<const ContactName> names, std::size_t k,
+                                           const Contact<S>& c) {
   return k < names.size() && names[k] == ContactName::of(c);
 }
 

@@ -229,6 +229,12 @@ class ContactProblem : public detail::ProblemBodies<S> {
   template <class B>
   [[gnu::always_inline]] inline Lanes take(const Taking<B>& taking, const Group& group, Most& most);
 
+  /// And with the last one once more, which their bodies have already, or with one that these get.
+  template <class B>
+  [[gnu::flatten]] void takeAgain(const Taking<B>& taking, const Group& group, Most& most);
+  template <class B>
+  [[gnu::flatten]] void takeWithGuess(const Taking<B>& taking, const Group& group, Most& most);
+
   /// All rows but the lone ones after a restart, with the targets they have.
   template <class B>
   void fillAll(const Taking<B>& taking);
@@ -275,8 +281,8 @@ class ContactProblem : public detail::ProblemBodies<S> {
 
   /// Target of a row that may be faster than what rests.
   template <class B>
-  S rebound(const Taking<B>& taking, const Group& group, std::size_t lane, const Vector3<S>& n, const S& v_n,
-            const S& allowed, S pull);
+  [[gnu::noinline]] S rebound(const Taking<B>& taking, const Group& group, std::size_t lane,
+                              const Vector3<S>& n, const S& v_n, const S& allowed, S pull);
 
   template <class B>
   Vector3<S> driftOf(const Taking<B>& taking, const Group& group, std::size_t lane) const {
@@ -284,15 +290,12 @@ class ContactProblem : public detail::ProblemBodies<S> {
   }
 
   template <class B>
-  void aimSlip(const Taking<B>& taking, const Group& group, std::size_t lane, const Lanes& rowLanes,
-               const S& drift_n, const Vector3<S>& turned);
+  [[gnu::noinline]] void aimSlip(const Taking<B>& taking, const Group& group, std::size_t lane,
+                                 const Lanes& rowLanes, const S& drift_n, const Vector3<S>& turned);
 
   /// What slid in the last solve slides: its friction was at the kinetic limit.
   [[gnu::always_inline]] inline void recallSlides(const Group& group, const Lanes& row);
   bool slid(std::size_t k, const S& kineticFriction) const;
-  /// Begin with the first guess of rows: whose bodies have it already, or get it.
-  [[gnu::always_inline]] inline void repeat(const Group& group, Lanes& row);
-  [[gnu::always_inline]] inline void guess(const Group& group, Lanes& row);
 
   /// Rows that were taken up, and their impulses.
   [[gnu::always_inline]] inline void put(const Group& group, const Lanes& row) {

@@ -30,6 +30,34 @@ void ContactProblem<S>::recall(const ContactColoring& colouring) {
 }
 
 template <Real S>
+template <class B, class Wanted>
+auto ContactProblem<S>::lookAtRows(const Taking<B>& taking, Wanted&& wanted) -> Most {
+  const ContactColoring& colouring = taking.colouring;
+  return detail::sumOverAllParts(colouring, Most{}, [&](std::size_t begin, std::size_t end, Most& part) {
+    if (begin < colouring.loneCount()) {
+      return;
+    }
+    detail::forGroupsOf<S>(
+        colouring, begin, end, [&](std::size_t k) { return wanted(k, part); },
+        [&](const Group& group) { takeAgain(taking, group, part); });
+  });
+}
+
+template <Real S>
+template <class B>
+void ContactProblem<S>::takeAgain(const Taking<B>& taking, const Group& group, Most& most) {
+  Lanes row = take(taking, group, most);
+  recallSlides(group, row);
+  takeGuess(group, row, detail::BodyLanes<S>::load(bodies, group.slot1),
+            detail::BodyLanes<S>::load(bodies, group.slot2));
+  for (std::size_t lane = 0; lane < group.count && !turning.empty(); ++lane) {
+    turning[group.row[lane]].l = impulseIn(Vector3<S>(ratio_ * last_->turning(group.row[lane])));
+  }
+  put(group, row);
+  most += Most{S(0), wrongAt(group, row).largest(), group.count};
+}
+
+template <Real S>
 template <class B>
 void ContactProblem<S>::fillAll(const Taking<B>& taking) {
   forGroups(taking.colouring, taking.colouring.loneCount(), rows.size(), [&](const Group& group) {

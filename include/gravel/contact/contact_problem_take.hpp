@@ -79,9 +79,7 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
         detail::sumOverColourParts(colouring, Most{}, [&](std::size_t begin, std::size_t end, Most& part) {
           forGroups(colouring, begin, end, [&](const Group& group) {
             fetch(taking, group.row[0] + lookAhead);
-            Lanes row = take(taking, group, part);
-            guess(group, row);
-            put(group, row);
+            takeWithGuess(taking, group, part);
           });
         });
   }
@@ -89,25 +87,6 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   wrong_sq = most.wrong_sq;
   looks = most.looks;
   active = largestApproach > S(0);
-}
-
-template <Real S>
-template <class B, class Wanted>
-auto ContactProblem<S>::lookAtRows(const Taking<B>& taking, Wanted&& wanted) -> Most {
-  const ContactColoring& colouring = taking.colouring;
-  return detail::sumOverAllParts(colouring, Most{}, [&](std::size_t begin, std::size_t end, Most& part) {
-    if (begin < colouring.loneCount()) {
-      return;
-    }
-    detail::forGroupsOf<S>(
-        colouring, begin, end, [&](std::size_t k) { return wanted(k, part); },
-        [&](const Group& group) {
-          Lanes row = take(taking, group, part);
-          repeat(group, row);
-          put(group, row);
-          part += Most{S(0), wrongAt(group, row).largest(), group.count};
-        });
-  });
 }
 
 template <Real S>
@@ -217,7 +196,8 @@ inline S ContactProblem<S>::aim(const Taking<B>& taking, const Group& group, Lan
                  : row.target[lane];
     });
   }
-  for (std::size_t lane = 0; lane < group.count && !slipTargets.empty(); ++lane) {
+  const bool slips = !slipTargets.empty() && (drifting || bends || fast.any() || turned.counts.any());
+  for (std::size_t lane = 0; lane < group.count && slips; ++lane) {  // of the others they are zero
     aimSlip(taking, group, lane, row, drift[lane], slip.at(lane));
   }
   const Pack approach = row.target - present;
@@ -284,17 +264,9 @@ void ContactProblem<S>::aimSlip(const Taking<B>& taking, const Group& group, std
 }
 
 template <Real S>
-inline void ContactProblem<S>::repeat(const Group& group, Lanes& row) {
-  recallSlides(group, row);
-  takeGuess(group, row, detail::BodyLanes<S>::load(bodies, group.slot1),
-            detail::BodyLanes<S>::load(bodies, group.slot2));
-  for (std::size_t lane = 0; lane < group.count && !turning.empty(); ++lane) {
-    turning[group.row[lane]].l = impulseIn(Vector3<S>(ratio_ * last_->turning(group.row[lane])));
-  }
-}
-
-template <Real S>
-inline void ContactProblem<S>::guess(const Group& group, Lanes& row) {
+template <class B>
+void ContactProblem<S>::takeWithGuess(const Taking<B>& taking, const Group& group, Most& most) {
+  Lanes row = take(taking, group, most);
   recallSlides(group, row);
   auto b1 = detail::BodyLanes<S>::load(bodies, group.slot1);
   auto b2 = detail::BodyLanes<S>::load(bodies, group.slot2);
@@ -312,6 +284,7 @@ inline void ContactProblem<S>::guess(const Group& group, Lanes& row) {
       detail::turn(row2, bodies[group.slot1[lane]], bodies[group.slot2[lane]], row2.l);
     }
   }
+  put(group, row);
 }
 
 }  // namespace gravel

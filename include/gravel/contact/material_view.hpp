@@ -48,10 +48,9 @@ struct MaterialView {
     std::size_t size() const { return entries.size(); }
 
     /// \throws std::invalid_argument, if there is none of this number
-    const Material<Scalar>& operator[](std::uint32_t id) const {
+    [[gnu::always_inline]] const Material<Scalar>& operator[](std::uint32_t id) const {
       if (id >= entries.size()) {
-        detail::refuse("material of a body", std::to_string(id),
-                       "below the number of materials, " + std::to_string(entries.size()));
+        refuse(id);
       }
       return entries[id];
     }
@@ -63,6 +62,12 @@ struct MaterialView {
       const MaterialPair<Scalar> wanted{std::min(a, b), std::max(a, b), {}};
       const auto found = std::lower_bound(pairs.begin(), pairs.end(), wanted);
       return found != pairs.end() && !(wanted < *found) ? found->material : mix((*this)[a], ofB);
+    }
+
+   private:
+    [[noreturn, gnu::cold, gnu::noinline]] void refuse(std::uint32_t id) const {
+      detail::refuse("material of a body", std::to_string(id),
+                     "below the number of materials, " + std::to_string(entries.size()));
     }
 };
 

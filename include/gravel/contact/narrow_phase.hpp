@@ -160,10 +160,11 @@ class NarrowPhase {
   }
 
   /// From the first centre to the nearest image of the second, which moves on by `drift` more.
-  Vector3<S> separation(Pair pair, const Domain<S>& domain, const NarrowPhaseSettings<S>& settings,
-                        Vector3<S>& drift) const {
+  [[gnu::always_inline]] inline Vector3<S> separation(Pair pair, const Domain<S>& domain,
+                                                      const NarrowPhaseSettings<S>& settings,
+                                                      Vector3<S>& drift) const {
     Vector3<S> r_ij = spheres_[pair.second].x - spheres_[pair.first].x;
-    drift = Vector3<S>::Zero();
+    drift = Vector3<S>(S(0), S(0), S(0));
     if (!domain.isOpen()) {
       domain.minimumImage(r_ij, drift, settings.time);
     }
@@ -171,8 +172,9 @@ class NarrowPhase {
   }
 
   template <class B>
-  void appendPair(Pair pair, const B& bodies, const Domain<S>& domain, const MaterialView<S>& materials,
-                  const NarrowPhaseSettings<S>& settings, std::vector<Pair>& part, Cursor& cursor) const {
+  [[gnu::flatten]] void appendPair(Pair pair, const B& bodies, const Domain<S>& domain,
+                                   const MaterialView<S>& materials, const NarrowPhaseSettings<S>& settings,
+                                   std::vector<Pair>& part, Cursor& cursor) const {
     const std::uint32_t i = pair.first;
     const std::uint32_t j = pair.second;
     Vector3<S> drift;

@@ -31,18 +31,9 @@ class ProblemBodies {
   /// Writes the velocities of movable bodies back, spins only where they changed.
   template <ContactBodies B>
   void scatter(B& target, const ContactColoring& colouring) const {
-    auto&& velocities = target.velocities();
-    auto&& spins = target.angularVelocities();
-    auto&& radii = target.radii();
-    parallelFor(colouring.bodies().size(), chunk, [&](std::size_t slot) {
-      const std::uint32_t i = colouring.bodies()[slot];
-      if (bodies[slot].v != initial[slot].v) {
-        velocities[i] = scaled<S>(bodies[slot].v, -speedExponent_);
-      }
-      if (friction && bodies[slot].s != initial[slot].s) {
-        spins[i] = Vector3<S>(scaled<S>(bodies[slot].s, -speedExponent_) / radii[i]);
-      }
-    });
+    parallelForChunks<Share::Alike>(
+        colouring.bodies().size(), chunk,
+        [&](std::size_t begin, std::size_t end) { scatterPart(target, colouring, begin, end); });
   }
 
   /// [m s^-2] Against this contacts hold a body: its acceleration; where nothing stands still, less that of
@@ -86,43 +77,7 @@ class ProblemBodies {
     // Mostly nothing was to be scaled, and so it goes on: one look at a body is enough.
     const bool plain = speedExponent_ == 0 && massExponent_ == 0;
     const Scales scales = orderedSum(n, chunk, Scales{}, [&](std::size_t begin, std::size_t end) {
-      Scales part;
-      for (std::size_t slot = begin; slot < end; ++slot) {
-        Body now = take(source, colouring, islands, slot);
-        part += {std::max<S>(maxAbs(now.v), maxAbs(now.s)), S(0), now.inverseMass, now.inverseMass};
-        if (now.inverseMass > S(0)) {
-          part.leastFall = std::min<S>(part.leastFall, initial[slot].fall);
-        }
-        if (initial[slot].radius > S(0)) {
-          part.mostTurn = std::max<S>(part.mostTurn, S(now.s.squaredNorm() / initial[slot].radius));
-        }
-        Body weighed = now;
-        weigh(weighed);
-        auto& start = initial[slot];
-        Vector3<S> dv = Vector3<S>::Zero();
-        Vector3<S> ds = Vector3<S>::Zero();
-        if (again) {
-          const Body& before = bodies[slot];
-          if (watch.holds()) {
-            watch.move(slot, Vector3<S>(now.v - start.v).norm() + Vector3<S>(now.s - start.s).norm());
-          }
-          dv = before.v - start.v;
-          ds = before.s - start.s;
-          part.change = std::max<S>(part.change, std::max<S>(maxAbs(dv), maxAbs(ds)));
-          part.others += weighed.inverseMass == before.inverseMass && weighed.spin == before.spin ? 0 : 1;
-        }
-        if (plain) {
-          start.v = now.v;
-          start.s = now.s;
-          weighed.v += ratio * dv;
-          weighed.s += ratio * ds;
-        } else {
-          start.v = dv;
-          start.s = ds;
-        }
-        bodies[slot] = plain ? weighed : now;
-      }
-      return part;
+      return gatherPart(source, colouring, islands, ratio, plain, begin, end);
     });
     turns_ = scales.mostTurn > turningShare<S>() * scales.leastFall;
     const bool wasAgain = again;
@@ -161,6 +116,68 @@ class ProblemBodies {
         b.s += ratio * scaled<S>(ds, speedExponent_ - speedExponent);
       }
     });
+  }
+
+  template <class B>
+  [[gnu::flatten]] void scatterPart(B& target, const ContactColoring& colouring, std::size_t begin,
+                                    std::size_t end) const {
+    auto&& velocities = target.velocities();
+    auto&& spins = target.angularVelocities();
+    auto&& radii = target.radii();
+    for (std::size_t slot = begin; slot < end; ++slot) {
+      const std::uint32_t i = colouring.bodies()[slot];
+      if (bodies[slot].v != initial[slot].v) {
+        velocities[i] = scaled<S>(bodies[slot].v, -speedExponent_);
+      }
+      if (friction && bodies[slot].s != initial[slot].s) {
+        spins[i] = Vector3<S>(scaled<S>(bodies[slot].s, -speedExponent_) / radii[i]);
+      }
+    }
+  }
+
+  /// Of slots [begin, end) what gatherBodies() begins with. \param plain  it is thought that nothing is to be
+  /// scaled
+  template <class B>
+  [[gnu::flatten]] Scales gatherPart(const B& source, const ContactColoring& colouring,
+                                     const SolverIslands& islands, const S& ratio, bool plain,
+                                     std::size_t begin, std::size_t end) {
+    Scales part;
+    for (std::size_t slot = begin; slot < end; ++slot) {
+      Body now = take(source, colouring, islands, slot);
+      part += {std::max<S>(maxAbs(now.v), maxAbs(now.s)), S(0), now.inverseMass, now.inverseMass};
+      if (now.inverseMass > S(0)) {
+        part.leastFall = std::min<S>(part.leastFall, initial[slot].fall);
+      }
+      if (initial[slot].radius > S(0)) {
+        part.mostTurn = std::max<S>(part.mostTurn, S(now.s.squaredNorm() / initial[slot].radius));
+      }
+      Body weighed = now;
+      weigh(weighed);
+      auto& start = initial[slot];
+      Vector3<S> dv = Vector3<S>::Zero();
+      Vector3<S> ds = Vector3<S>::Zero();
+      if (again) {
+        const Body& before = bodies[slot];
+        if (watch.holds()) {
+          watch.move(slot, Vector3<S>(now.v - start.v).norm() + Vector3<S>(now.s - start.s).norm());
+        }
+        dv = before.v - start.v;
+        ds = before.s - start.s;
+        part.change = std::max<S>(part.change, std::max<S>(maxAbs(dv), maxAbs(ds)));
+        part.others += weighed.inverseMass == before.inverseMass && weighed.spin == before.spin ? 0 : 1;
+      }
+      if (plain) {
+        start.v = now.v;
+        start.s = now.s;
+        weighed.v += ratio * dv;
+        weighed.s += ratio * ds;
+      } else {
+        start.v = dv;
+        start.s = ds;
+      }
+      bodies[slot] = plain ? weighed : now;
+    }
+    return part;
   }
 
   /// From the mass of what is movable to its inverse, in the problem's units.

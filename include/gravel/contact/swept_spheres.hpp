@@ -47,7 +47,7 @@ class SweptSpheres {
 
   /// The course of body i is another one now.
   template <class Scene>
-  void renew(const Scene& scene, std::uint32_t i, const S& h) {
+  [[gnu::flatten]] void renew(const Scene& scene, std::uint32_t i, const S& h) {
     S way = standing_;
     if (isMovable(scene.bodies, i)) {
       way = lost_ + h * safeNorm(Vector3<S>(scene.course.velocity(scene.bodies, i) - common_)) +

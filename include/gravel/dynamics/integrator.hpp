@@ -51,8 +51,9 @@ void kickAndDriftOne(Bodies<Scalar, Layout>& bodies, std::size_t i, const Scalar
 
 /// The same for a tile of movable bodies, the first of which is i; those from `end` on are none.
 template <Real Scalar, class Layout>
-void kickAndDriftTile(Bodies<Scalar, Layout>& bodies, std::size_t i, std::size_t end, const Scalar& kick,
-                      const Scalar& drift, bool torques, Compensation<Scalar>* lost) {
+[[gnu::flatten]] void kickAndDriftTile(Bodies<Scalar, Layout>& bodies, std::size_t i, std::size_t end,
+                                       const Scalar& kick, const Scalar& drift, bool torques,
+                                       Compensation<Scalar>* lost) {
   if constexpr (hasColumns<typename Bodies<Scalar, Layout>::Storage>) {
     using Lane = BodyTile<Scalar>;
     auto& storage = bodies.storage();
