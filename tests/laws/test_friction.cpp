@@ -180,4 +180,80 @@ TEST_CASE("A ball that spins in the corner of a floor and a wall slows down as t
   }
 }
 
+// The belt turns the ball, so that the wall's friction presses it to the belt: N1 = m g + mu N2 and N2 = mu
+// N1, hence N1 = m g/(1 - mu^2), and from mu = 1 on no finite loads are right. Friction counts normal
+// impulses of at most a hundred times those of the largest approach, g h/2, and of a fall, g h, in each of
+// the two solves of a step: N1 <= m g (1 + 300 mu), of which the plane's force has sqrt(1 + mu^2). Seen to
+// fail: without that bound the force was 5e7 m g and more.
+TEST_CASE("A ball that a belt jams against a wall is loaded with a bounded force, and the residual tells") {
+  for (const double mu : {1.0, 1.2}) {
+    for (const double dt : {1.0 / 60, 1e-3}) {
+      CAPTURE(mu, dt);
+      Space<double> space = onPlane(dt, 0.0, mu, mu, {0, 0, 0});
+      space.setPlaneVelocity(0, {-2, 0, 0});
+      space.addPlane({1, 0, 0}, -radius);
+      for (std::size_t i = 0; i < 30; ++i) {
+        space.computeDynamics(i);
+        CHECK(space.planeForce(0).norm() <= 1.001 * std::sqrt(1 + mu * mu) * (1 + 300 * mu) * 3.0 * g);
+        CHECK(space.body(0).velocity().norm() < 2.0);
+      }
+    }
+  }
+}
+
+// Walls at 1 degree bear g/(2 sin 1) of its mass each, 29 times its weight: friction counts all of that, and
+// belts along the groove drag the ball by mu g/sin 1 = 56 g, at a load that a solve has to 1e-3 of itself.
+TEST_CASE("Belts drag a ball that is wedged between steep walls by all of its load") {
+  const double slope = std::acos(-1.0) / 180;
+  const double mu = 0.01;
+  const double dt = 1e-3;
+  Space<double> space = onPlane(dt, 0.0, mu, mu, {0, 0, 0});
+  space.removePlane(0);
+  for (const double side : {1.0, -1.0}) {
+    const std::size_t wall = space.addPlane({side * std::cos(slope), 0, std::sin(slope)}, 0.0);
+    space.setPlaneVelocity(wall, {0, 1, 0});
+  }
+  space.body(0).position() = Vec(0, 0, radius / std::sin(slope));
+  for (std::size_t i = 0; i < 20; ++i) {
+    space.computeDynamics(i);
+  }
+  const double v = mu * g / std::sin(slope) * space.time();
+  CHECK_THAT(space.body(0).velocity()[1], WithinAbs(v, 2e-3 * v));
+}
+
+// Three on a belt, two on these and three on top, between walls that move: friction of each loads the next,
+// and sweeps add to all of it. What is as fast as the fastest surface at the start may be thrown upwards, and
+// falls for a tenth of a second. Seen to fail: a ball at 415 m/s after the second step.
+TEST_CASE("Spinning balls that jam between moving walls get no faster than their surfaces were") {
+  SimulationConfig<double> config = plain(1e-3);
+  config.coeffRestitution = 0.0;
+  config.coeffFriction = config.coeffStaticFriction = 1.0;
+  config.contactTolerance = 1e-8;
+  config.contactIterations = 20000;
+  Space<double> space(config);
+  space.setUniformField({0, 0, -g});
+  space.setPlaneVelocity(space.addPlane({0, 0, 1}, 0.0), {-0.2079, 0, 0});
+  space.setPlaneVelocity(space.addPlane({1, 0, 0}, 0.0), {0, 0, 0.0372});
+  space.setPlaneVelocity(space.addPlane({-1, 0, 0}, -6 * radius), {0, 0, 0.6179});
+  const double spins[] = {26.183, 14.821, -27.519, -35.311, -36.427, 21.209, 20.373, -7.433};
+  std::size_t next = 0;
+  for (int layer = 0; layer < 3; ++layer) {
+    for (int i = 0; i < 3 - layer % 2; ++i) {
+      Body<double> b = ball({(2 * i + 1 + layer % 2) * radius, 0, (1 + layer * std::sqrt(3.0)) * radius},
+                            {0, 0, 0}, radius, 1.0);
+      b.angularVelocity = Vec(0, spins[next++], 0);
+      space.addBody(b);
+    }
+  }
+  double fastest = 0;
+  for (std::size_t step = 0; step < 100; ++step) {
+    space.computeDynamics(step);
+    for (std::size_t i = 0; i < space.n(); ++i) {
+      fastest = std::max(fastest, space.body(i).velocity().norm());
+      fastest = std::max(fastest, radius * space.body(i).angularVelocity().norm());
+    }
+  }
+  CHECK(fastest < 36.427 * radius + g * space.time());
+}
+
 }  // namespace test_friction

@@ -19,13 +19,14 @@ template <Real S>
 inline detail::RowSlides<S> ContactProblem<S>::slidesOf(const Group& group) const {
   const Pack zero = Pack::zero();
   if (!grips) {
-    return {zero > zero, zero > zero};
+    return {zero > zero, zero > zero, Pack::all(this->mostLoad_)};
   }
   const auto of = [&](auto&& is) {
     return Pack::of([&](std::size_t lane) { return S(is(marks[group.row[lane]]) ? 1 : 0); }) > zero;
   };
   return {of([&](const detail::RowMark& m) { return m.kinetic || atOnce; }),
-          of([](const detail::RowMark& m) { return m.slides >= detail::RowMark::patience; })};
+          of([](const detail::RowMark& m) { return m.slides >= detail::RowMark::patience; }),
+          Pack::all(this->mostLoad_)};
 }
 
 template <Real S>

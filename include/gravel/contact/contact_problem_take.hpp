@@ -26,6 +26,7 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   impulses_ = &impulses;
   last_ = &last;
   ratio_ = ratio;
+  this->mostLoad_ = Eigen::NumTraits<S>::highest();
   kept = false;
   detail::resizeSparingly(rows, contacts.size());
   detail::resizeSparingly(marks, contacts.size());
@@ -87,6 +88,8 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   wrong_sq = most.wrong_sq;
   looks = most.looks;
   active = largestApproach > S(0);
+  const S stop = largestApproach + speedIn(S(this->mostFall_ * dt));
+  this->mostLoad_ = S(100 * static_cast<double>(colouring.bodies().size())) * this->heaviest_ * stop;
 }
 
 template <Real S>

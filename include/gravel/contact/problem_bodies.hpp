@@ -90,8 +90,9 @@ class ProblemBodies {
     massExponent_ = scaleExponent<S>(scales.lightest, scales.heaviest);
     sameScales_ = speedExponent == speedExponent_ && massExponent == massExponent_;
     again = again && (sameScales_ || !plain);
-    mostGuess_ =
-        tooMuch * scaled<S>(scales.fastest, speedExponent_) * scaled<S>(scales.heaviest, massExponent_);
+    heaviest_ = scaled<S>(scales.heaviest, massExponent_);
+    mostFall_ = scales.mostFall;
+    mostGuess_ = tooMuch * scaled<S>(scales.fastest, speedExponent_) * heaviest_;
     initial[n].v = initial[n].s = Vector3<S>::Zero();
     initial[n].fall = initial[n].radius = S(0);
     bodies[n] = Body{Vector3<S>::Zero(), S(0), Vector3<S>::Zero(), S(0)};
@@ -147,6 +148,7 @@ class ProblemBodies {
       part += {std::max<S>(maxAbs(now.v), maxAbs(now.s)), S(0), now.inverseMass, now.inverseMass};
       if (now.inverseMass > S(0)) {
         part.leastFall = std::min<S>(part.leastFall, initial[slot].fall);
+        part.mostFall = std::max<S>(part.mostFall, initial[slot].fall);
       }
       if (initial[slot].radius > S(0)) {
         part.mostTurn = std::max<S>(part.mostTurn, S(now.s.squaredNorm() / initial[slot].radius));
@@ -275,6 +277,11 @@ class ProblemBodies {
   std::vector<IslandFall> common_;    ///< by the slot that stands for the island
   /// Above that an impulse of the last problem would leave nothing but its rounding: speeds have fallen.
   S mostGuess_ = S(0);
+  S heaviest_ = S(0);  ///< mass, scaled
+  S mostFall_ = S(0);  ///< [m s^-2]
+  /// Normal impulse that friction counts at most: 100 times what stops all at the largest approach and a
+  /// fall.
+  S mostLoad_ = S(0);
 };
 
 }  // namespace gravel::detail

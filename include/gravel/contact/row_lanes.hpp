@@ -186,6 +186,7 @@ template <Real S>
 struct RowSlides {
   typename Packed<S>::Truth kinetic;  ///< what cuts friction is the kinetic limit; in others the static one
   typename Packed<S>::Truth tired;    ///< that have begun to too often: they go on, since sweeps must end
+  Packed<S> mostLoad = Packed<S>::all(Eigen::NumTraits<S>::highest());  ///< friction is by no more than this
 };
 
 /// The tangential impulse of `row` becomes right for its normal one: a row sticks up to the static limit.
@@ -199,7 +200,8 @@ template <Real S>
   const P mobility = tangentialMobility(row, b1, b2);
   const PackedVector<S> wanted = row.jt - reciprocalOf(mobility) * slip;
   const P size_sq = wanted.squaredNorm();
-  const P most = choose(sliding.tired, row.slide, row.stick) * row.jn;
+  const P load = smallerOf(row.jn, sliding.mostLoad);
+  const P most = choose(sliding.tired, row.slide, row.stick) * load;
   changes.rubs = (row.stick > zero) & (mobility > zero) & ((row.jn > zero) | (row.jt.sumAbs() > zero));
   changes.slides = changes.rubs & (size_sq > most * most);
   PackedVector<S> jt = choose(changes.rubs, wanted, row.jt);
@@ -207,7 +209,7 @@ template <Real S>
     const P limit = choose(sliding.kinetic, row.slide, row.stick);
     // Roots of lanes may take subnormal numbers for 0.
     const P normal_sq = largerOf(size_sq, P::all(std::numeric_limits<S>::min()));
-    const P kept = limit * row.jn / squareRoot(choose(changes.slides, normal_sq, P::all(S(1))));
+    const P kept = limit * load / squareRoot(choose(changes.slides, normal_sq, P::all(S(1))));
     jt = choose(changes.slides, kept * wanted, jt);
   }
   changes.dt = jt - row.jt;

@@ -69,13 +69,15 @@ struct SolvedProblem {
 };
 
 /// The largest speed, the largest change of one that is to be done again, the masses > 0, how many are not
-/// what they were, and of those that move the least fall [m s^-2] and the largest s^2/r [m s^-2].
+/// what they were, and of those that move the least and the most fall [m s^-2] and the largest s^2/r
+/// [m s^-2].
 template <Real S>
 struct ProblemScales {
   S fastest = S(0);
   S change = S(0);
   S lightest = S(0);
   S heaviest = S(0);
+  S mostFall = S(0);
   std::size_t others = 0;
   S leastFall = Eigen::NumTraits<S>::highest();
   S mostTurn = S(0);
@@ -86,6 +88,7 @@ struct ProblemScales {
     fastest = std::max<S>(fastest, other.fastest);
     change = std::max<S>(change, other.change);
     heaviest = std::max<S>(heaviest, other.heaviest);
+    mostFall = std::max<S>(mostFall, other.mostFall);
     if (other.lightest > S(0) && !(lightest > S(0) && lightest <= other.lightest)) {
       lightest = other.lightest;
     }
