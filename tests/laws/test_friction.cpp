@@ -185,7 +185,7 @@ TEST_CASE("A ball that spins in the corner of a floor and a wall slows down as t
 // impulses of at most a hundred times those of the largest approach, g h/2, and of a fall, g h, in each of
 // the two solves of a step: N1 <= m g (1 + 300 mu), of which the plane's force has sqrt(1 + mu^2). Seen to
 // fail: without that bound the force was 5e7 m g and more.
-TEST_CASE("A ball that a belt jams against a wall is loaded with a bounded force, and the residual tells") {
+TEST_CASE("A ball that a belt jams against a wall is loaded with a bounded force") {
   for (const double mu : {1.0, 1.2}) {
     for (const double dt : {1.0 / 60, 1e-3}) {
       CAPTURE(mu, dt);
