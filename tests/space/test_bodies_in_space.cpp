@@ -662,6 +662,57 @@ TEST_CASE("A body lifted off the floor and thrown down bounces as one that came 
   }
 }
 
+// A few micrometres above the floor at the start of a step. Seen to fail: where contacts were found anew it
+// was taken to rest, and left with 0.86 to 1.25 of its speed.
+TEST_CASE("A ball about to land bounces alike, whatever is changed elsewhere") {
+  const double g = 9.81;
+  const double h = 1e-3;
+  for (const double speed : {1.6, 2.0, 3.0, 8.0, 20.0}) {  // in g h
+    for (int change = 0; change < 7; ++change) {
+      for (const bool onBall : {false, true}) {
+        INFO("speed " << speed << ", change " << change << ", on a ball " << onBall);
+        SimulationConfig<double> config = quiet();
+        config.timeStep = h;
+        config.coeffRestitution = 0.8;
+        Space<double> space(config);
+        space.setUniformField({0, 0, -g});
+        space.addPlane({0, 0, 1}, onBall ? -50.0 : 0.0);
+        const std::size_t far = space.addPlane({1, 0, 0}, -100.0);
+        const double low = 0.3 * g * h * h;
+        const double v = -speed * g * h;
+        Body<double> lands = at({0, 0, 0.5 + low - v * h - g * h * h / 2}, 0.5);
+        lands.velocity[2] = v + g * h;
+        const BodyId id = space.addBody(lands);
+        Body<double> fixed = at({0, 0, onBall ? -0.5 : 40.0}, 0.5);
+        fixed.fixed = true;
+        space.addBody(fixed);
+        fixed.position = Vec(50, 0, 50);
+        const BodyId other = space.addBody(fixed);
+        const BodyId moving = space.addBody(at({20, 0, 50}));
+        space.computeDynamics(0);
+        if (change == 1) {
+          space.setUniformField({0, 0, -g});
+        } else if (change == 2) {
+          space.body(other).position()[0] += 0.1;
+        } else if (change == 3) {
+          space.body(moving).mass() = 2;
+        } else if (change == 4) {
+          space.addBody(at({30, 0, 50}));
+        } else if (change == 5) {
+          space.removePlane(far);
+        } else if (change == 6) {
+          space.setDomain(Domain<double>::open());
+        }
+        space.computeDynamics(1);
+        const auto up = space.body(id);
+        const double energy = up.velocity()[2] * up.velocity()[2] + 2 * g * (up.position()[2] - 0.5);
+        CHECK_THAT(energy, WithinRel(0.64 * (v * v + 2 * g * low), 1e-9));
+        CHECK(space.energyLedger().restitution > 0);
+      }
+    }
+  }
+}
+
 // Seen to fail without G: the contact across the old box was solved once more, over nine metres.
 TEST_CASE("Another domain has other contacts at once") {
   for (const double G : {0.0, 1e-30}) {

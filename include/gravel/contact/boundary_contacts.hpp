@@ -73,11 +73,17 @@ class BoundaryContacts {
       if (!(wall.normal.dot(x) - wall.offset < radius + widestMargin(settings, radius))) {
         continue;
       }
-      const S margin = marginOf(settings, radius, [&] { return accelerationOf<S>(bodies, i); });
+      const auto falls = [&] { return accelerationOf<S>(bodies, i); };
+      const S margin = marginOf(settings, radius, falls);
       const auto touch = sphereHalfSpace<S>(x, radius, wall.normal, wall.offset, margin);
+      const auto approach = [&] {  // beyond what a plane that goes on changing its velocity brings
+        const S changes = S(4) * (wall.swing < S(0) ? S(-wall.swing) : wall.swing);
+        return S(wall.normal.dot(Vector3<S>(wall.velocity - velocityOf(bodies, i))) - changes);
+      };
       if (touch && isMovable(bodies, i) &&
           (touch->gap < settings.margin ||
-           mayRest(settings, {bodies.ids()[i], boundaryKey(wall.number)}, cursor))) {
+           mayRest(settings, {bodies.ids()[i], boundaryKey(wall.number)}, cursor) ||
+           isSlow<S>(settings, approach(), falls()))) {
         const std::uint32_t m = bodies.materials()[i];
         const std::uint32_t number = part.surfaces.of(
             m, wall.number, wall.velocity, [&] { return materials.pair(m, wall.surface, wall.material); });

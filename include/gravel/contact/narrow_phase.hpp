@@ -200,7 +200,11 @@ class NarrowPhase {
         !(detail::isMovable(bodies, i) || detail::isMovable(bodies, j))) {
       return;
     }
-    if (!overlaps && !detail::mayRest(settings, keysOf(pair, bodies), cursor)) {
+    const auto isSlow = [&] {
+      const Vector3<S> u = detail::velocityOf(bodies, j) - detail::velocityOf(bodies, i) + drift;
+      return detail::isSlow<S>(settings, S(-r_ij.dot(u) / distance), falls());
+    };
+    if (!overlaps && !detail::mayRest(settings, keysOf(pair, bodies), cursor) && !isSlow()) {
       return;
     }
     (void)materials[bodies.materials()[i]];  // refused while the list is what it was

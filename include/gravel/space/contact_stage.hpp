@@ -54,7 +54,7 @@ class ContactStage {
   }
 
   /// Finds all contacts at the present positions, for steps of length h [s]. All pairs as near as what rests
-  /// are taken to rest; those of the last step alone, if `goesOn`.
+  /// that approach slowly are taken to rest; those of the last step alone, if `goesOn`.
   void detect(const Bodies& bodies, const Config& config, const Scalar& time, const Scalar& h, bool goesOn,
               Profiler& profiler);
 

@@ -46,9 +46,11 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
   prepareSurfaces(config);
   gapStep_ = goesOn ? detail::nextGapStep(gapStep_, h) : std::max<Scalar>(gapStep_, h);
   NarrowPhaseSettings<Scalar> settings{time, config.epsilon, Scalar(0), gapStep_};
+  settings.resting = names();
   if (goesOn) {
-    settings.resting = names();
     settings.settled = settled();
+  } else {
+    settings.slow = std::max(config.restitutionThreshold, config.epsilon);
   }
   settings.before = solver_.names();
   contactsChanged();
