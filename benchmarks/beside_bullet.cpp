@@ -116,6 +116,9 @@ class Bullet {
                                                   nullptr, shape, inertia);
     info.m_friction = btScalar(std::sqrt(scene.mu));  // Bullet multiplies those of the two
     info.m_restitution = btScalar(scene.e);
+    // The torque of two spheres over their force, a length here; it mixes s1 f2 + s2 f1.
+    info.m_spinningFriction =
+        scene.spinning > 0 ? btScalar(scene.spinning * radius / 2 / (2 * std::sqrt(scene.mu))) : btScalar(0);
     info.m_startWorldTransform.setIdentity();
     if (body != nullptr) {
       info.m_startWorldTransform.setOrigin(vector(body->position));
@@ -203,5 +206,6 @@ int main(int argc, char** argv) {
   const std::size_t steps = argument(4, 20);
   compare("pile, e = 0", pile(n, 0.0), settle, rounds, steps);
   compare("pile, e = 0.5", pile(n, 0.5), settle, rounds, steps);
+  compare("pile, e = 0.5, spinning friction 0.001", pile(n, 0.5, 0.001), settle, rounds, steps);
   compare("gas, elastic, volume fraction 0.2", gas(n), 100, rounds, steps);
 }

@@ -28,6 +28,7 @@ struct Scene {
   double g = 0;
   double e = 0;
   double mu = 0;
+  double spinning = 0;       ///< coefficient of spinning friction
   bool smoothSides = false;  ///< no friction at upright walls
   double h = 1.0 / 60;       ///< step
 
@@ -46,13 +47,14 @@ struct Scene {
 };
 
 /// Spheres of mass 1 that fall from a loose lattice onto the floor.
-inline Scene pile(std::size_t n, double e) {
+inline Scene pile(std::size_t n, double e, double spinning = 0) {
   Scene scene;
   const auto side = static_cast<std::size_t>(std::cbrt(static_cast<double>(n)) + 0.5);
   scene.width = 1.1 * static_cast<double>(side) * 2 * radius;
   scene.g = g;
   scene.e = e;
   scene.mu = 0.5;
+  scene.spinning = spinning;
   const double spacing = scene.width / static_cast<double>(side);
   const gravel::CounterRandom random(1);
   for (std::size_t i = 0; i < n; ++i) {
@@ -95,6 +97,7 @@ gravel::Space<S> spaceOf(const Scene& scene, gravel::SimulationConfig<S> config)
   config.adaptiveTimeStep = false;
   config.coeffRestitution = static_cast<S>(scene.e);
   config.coeffFriction = config.coeffStaticFriction = static_cast<S>(scene.mu);
+  config.spinningFriction = static_cast<S>(scene.spinning);
   gravel::Space<S> space(config);
   const gravel::MaterialId smooth = space.addMaterial({.staticFriction = S(0), .kineticFriction = S(0)});
   for (const auto& [normal, offset] : scene.planes()) {
