@@ -159,7 +159,12 @@ int run(const Options& options) {
   // What an earlier run said at its end is not of this one, which may end without a word.
   for (const fs::path& last :
        {fs::path("summary.txt"), fs::path("picture.png"), "frames" / fs::path(scene.name + ".pvd")}) {
-    fs::remove(folder / last);
+    std::error_code error;
+    fs::remove(folder / last, error);
+    if (error) {
+      throw std::runtime_error("cannot write to the output folder " + folder.string() + ": " +
+                               error.message());
+    }
   }
   Diagnostics diagnostics(folder / "diagnostics.csv");
   std::optional<VtkSeries> series;
@@ -248,7 +253,10 @@ int main(int argc, char** argv) {
       "Without a scene file: a cloud of 2000 rocks that becomes a rubble pile.",
       "gravel-run"};
   Options options;
-  app.add_option("scene", options.sceneFile, "scene file (TOML), see examples/scenes");
+  app.add_option("scene", options.sceneFile, "scene file (TOML), see examples/scenes")
+      ->check([](const std::string& text) {
+        return text.empty() ? std::string("is empty; allowed: the name of a file") : std::string();
+      });
   app.add_option("-o,--output", options.output,
                  "folder for what is written; default: out/<name of the scene>");
   app.add_option("--duration", options.duration, "time to simulate, in place of the scene's own")
