@@ -20,6 +20,7 @@ struct ContactOutcomes {
   std::vector<std::pair<std::uint64_t, std::uint64_t>> merges;  ///< ids, in the order of contacts
   Scalar restitutionLoss = Scalar(0);                           ///< [J] of velocities that the user gave
   Scalar frictionLoss = Scalar(0);                              ///< [J] of spins
+  Scalar driftWork = Scalar(0);  ///< [J] put in by the shear of the domain, as in ContactReport
 };
 
 /// Asks `hook` about each contact of two bodies that approach faster than what rests picks up in a step,
@@ -77,6 +78,13 @@ ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, con
       };
       give(c.first, hit.first, outcome.velocity1, outcome.angularVelocity1);
       give(c.second, hit.second, outcome.velocity2, outcome.angularVelocity2);
+      if (!hit.second.fixed) {
+        const S sheared =
+            hit.second.mass *
+            Vector3<S>(outcome.velocity2 - hit.second.velocity).dot(Vector3<S>(contacts.drift(c)));
+        outcomes.restitutionLoss -= sheared;
+        outcomes.driftWork -= sheared;
+      }
     }
   }
   return outcomes;

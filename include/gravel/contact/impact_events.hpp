@@ -218,6 +218,9 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     remember(scene, std::clamp<S>(parting / speed, S(0), S(1)), report, ends);
     give(scene, event.first, one, outcome.velocity1, outcome.angularVelocity1, t, report);
     give(scene, event.second, two, outcome.velocity2, outcome.angularVelocity2, t, report);
+    const S sheared = two.movable ? S(two.mass * Vector3<S>(v2 - two.v).dot(drift)) : S(0);
+    report.restitutionLoss -= sheared;  // both as the first one sees them
+    report.driftWork -= sheared;
     return true;
   }
 

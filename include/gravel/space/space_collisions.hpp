@@ -36,6 +36,7 @@ auto Space<Scalar, Layout>::decideCollisions(const Scalar& time) -> std::vector<
   }
   left_.restitution += ends.restitutionLoss;
   left_.friction += ends.frictionLoss;
+  left_.work -= ends.driftWork;
   return merges;
 }
 
@@ -51,6 +52,7 @@ auto Space<Scalar, Layout>::decideTouching() -> std::vector<std::pair<BodyId, Bo
       std::max<Scalar>(this->config_.restitutionThreshold, this->config_.epsilon), dt_);
   left_.restitution += starts.restitutionLoss;
   left_.friction += starts.frictionLoss;
+  left_.work -= starts.driftWork;
   for (const auto& [id1, id2] : starts.merges) {
     merges.emplace_back(BodyId{id1}, BodyId{id2});
   }
@@ -104,10 +106,18 @@ void Space<Scalar, Layout>::merge(BodyId stays, BodyId goes, const Scalar& time)
   const std::size_t j = bodies_.indexOf(goes);
   const Body<Scalar> a = bodies_[i].load();
   const Body<Scalar> b = bodies_[j].load();
-  Vector r_ab = b.position - a.position;
-  Vector v_ab = b.velocity - a.velocity;
-  contact_.domain.minimumImage(r_ab, v_ab, time);
-  const Scalar motion = bodies_[i].kineticEnergy() + bodies_[j].kineticEnergy();
+  const Vector apart = b.position - a.position;
+  Vector r_ab = apart;
+  Vector drift = Vector::Zero();
+  contact_.domain.minimumImage(r_ab, drift, time);
+  const Vector v_ab = Vector(b.velocity - a.velocity) + drift;
+  // b goes into a as the image that a meets: that is work of the domain, as where b crosses an edge.
+  const HillFrame<Scalar> frame(contact_.domain);
+  const Vector shift = r_ab - apart;
+  const Scalar sped = b.mass * drift.dot(Vector(b.velocity + drift / Scalar(2)));
+  const Scalar seen = sped + b.mass * (frame.potential(Vector(b.position + shift)) -
+                                       frame.potential(b.position) - force_.field.dot(shift));
+  const Scalar motion = bodies_[i].kineticEnergy() + bodies_[j].kineticEnergy() + sped;
   const Scalar energy = bindingEnergy(i, time) + bindingEnergy(j, time) - pairEnergy(i, j, time);
   const Vector pull = Vector(bodies_[i].force()) + Vector(bodies_[j].force());
   const Body<Scalar> one = merged(a, b, r_ab, v_ab);
@@ -120,7 +130,8 @@ void Space<Scalar, Layout>::merge(BodyId stays, BodyId goes, const Scalar& time)
   const std::size_t now = bodies_.indexOf(stays);
   const Scalar lost = motion - bodies_[now].kineticEnergy();
   left_.restitution += lost;
-  left_.exchange += energy - bindingEnergy(now, time) - lost;  // of the potential
+  left_.work -= seen;
+  left_.exchange += energy + seen - bindingEnergy(now, time) - lost;  // of the potential
 }
 
 }  // namespace gravel
