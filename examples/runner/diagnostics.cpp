@@ -39,8 +39,13 @@ void Diagnostics::record(const Space<double>& space) {
 
 namespace {
 
-/// Indices of the bodies of the heaviest cluster.
-std::vector<std::size_t> heaviestCluster(const Space<double>& space) {
+struct Member {
+  std::size_t body;
+  Vector3<double> x, v;  ///< of the image that touches the others
+};
+
+/// The bodies of the heaviest cluster.
+std::vector<Member> heaviestCluster(const Space<double>& space) {
   const std::size_t n = space.n();
   std::vector<std::size_t> parent(n);
   std::iota(parent.begin(), parent.end(), std::size_t{0});
@@ -60,10 +65,29 @@ std::vector<std::size_t> heaviestCluster(const Space<double>& space) {
     mass[root(i)] += space.body(i).mass();
   }
   const auto heaviest = static_cast<std::size_t>(std::max_element(mass.begin(), mass.end()) - mass.begin());
-  std::vector<std::size_t> members;
-  for (std::size_t i = 0; i < n; ++i) {
-    if (root(i) == heaviest) {
-      members.push_back(i);
+  std::vector<std::vector<std::size_t>> touched(n);
+  for (const Contact<double>& contact : space.contacts()) {
+    if (contact.second != staticPartner && root(contact.first) == heaviest) {
+      touched[contact.first].push_back(contact.second);
+      touched[contact.second].push_back(contact.first);
+    }
+  }
+  std::vector<Member> members;
+  std::vector<bool> found(n, false);
+  const auto add = [&](std::size_t i, const Vector3<double>& x, const Vector3<double>& v) {
+    found[i] = true;
+    members.push_back({i, x, v});
+  };
+  add(heaviest, space.body(heaviest).position(), space.body(heaviest).velocity());
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    const Member from = members[k];
+    for (const std::size_t j : touched[from.body]) {
+      if (!found[j]) {
+        Vector3<double> r = space.body(j).position() - from.x;
+        Vector3<double> v = space.body(j).velocity() - from.v;
+        space.domain().minimumImage(r, v, space.time());
+        add(j, from.x + r, from.v + v);
+      }
     }
   }
   return members;
@@ -72,16 +96,16 @@ std::vector<std::size_t> heaviestCluster(const Space<double>& space) {
 }  // namespace
 
 Cluster largestCluster(const Space<double>& space) {
-  const std::vector<std::size_t> members = heaviestCluster(space);
+  const std::vector<Member> members = heaviestCluster(space);
   Cluster cluster;
   cluster.bodies = members.size();
   Vector3<double> centre = Vector3<double>::Zero(), drift = Vector3<double>::Zero();
   double volume = 0.0;
-  for (const std::size_t i : members) {
+  for (const auto& [i, place, velocity] : members) {
     const auto body = space.body(i);
     cluster.mass += body.mass();
-    centre += body.mass() * body.position();
-    drift += body.mass() * body.velocity();
+    centre += body.mass() * place;
+    drift += body.mass() * velocity;
     volume += 4.0 / 3.0 * pi<double>() * std::pow(body.radius(), 3);
   }
   if (!(cluster.mass > 0.0)) {
@@ -95,10 +119,10 @@ Cluster largestCluster(const Space<double>& space) {
   const Matrix3<double> one = Matrix3<double>::Identity();
   Matrix3<double> moments = Matrix3<double>::Zero();
   Vector3<double> angularMomentum = Vector3<double>::Zero();
-  for (const std::size_t i : members) {
+  for (const auto& [i, place, velocity] : members) {
     const auto body = space.body(i);
-    const Vector3<double> x = body.position() - centre;
-    const Vector3<double> v = body.velocity() - drift;
+    const Vector3<double> x = place - centre;
+    const Vector3<double> v = velocity - drift;
     moments += body.mass() * (x * x.transpose() + one * (body.radius() * body.radius() / 5.0));
     angularMomentum += body.mass() * x.cross(v) + body.inertia() * body.angularVelocity();
   }
@@ -111,9 +135,9 @@ Cluster largestCluster(const Space<double>& space) {
   const Matrix3<double> inertia = one * moments.trace() - moments;
   const Vector3<double> spin = inertia.ldlt().solve(angularMomentum);
   cluster.angularSpeed = spin.norm();
-  for (const std::size_t i : members) {
+  for (const auto& [i, place, velocity] : members) {
     const auto body = space.body(i);
-    const Vector3<double> v = body.velocity() - drift - spin.cross(body.position() - centre);
+    const Vector3<double> v = velocity - drift - spin.cross(place - centre);
     const Vector3<double> w = body.angularVelocity() - spin;
     cluster.internalMotion += 0.5 * (body.mass() * v.squaredNorm() + body.inertia() * w.squaredNorm());
   }

@@ -59,11 +59,11 @@ struct Cluster {
   double internalMotion = 0.0;  ///< kinetic energy of its bodies against that rigid body
 };
 
-/// The heaviest cluster of the last step's contacts.
+/// The heaviest cluster of the last step's contacts, in one piece where it lies across a face of the domain.
 Cluster largestCluster(const Space<double>& space);
 
 /// Share of the mass that cannot leave: bodies whose kinetic energy in the frame of the centre of mass is
-/// less than their depth in the potential of all others. O(N^2).
+/// less than their depth in the potential of all others. Of an open domain. O(N^2).
 double boundFraction(const Space<double>& space);
 
 /// Deepest overlap of two bodies over the smaller radius, at the last step's contacts.

@@ -84,7 +84,9 @@ fs::path madeFolder(const fs::path& folder) {
 class Schedule {
  public:
   Schedule(std::size_t times, double duration)
-      : count_(times), interval_(times > 1 ? duration / static_cast<double>(times - 1) : duration) {}
+      : count_(times),
+        duration_(duration),
+        interval_(times > 1 ? duration / static_cast<double>(times - 1) : duration) {}
   bool isDue(double time) {
     if (next_ >= count_ || time < at(next_)) {
       return false;
@@ -99,10 +101,13 @@ class Schedule {
   }
 
  private:
-  double at(std::size_t number) const { return static_cast<double>(number) * interval_; }
+  /// The last one is the end itself, which a product may pass by rounding.
+  double at(std::size_t number) const {
+    return number > 0 && number + 1 == count_ ? duration_ : static_cast<double>(number) * interval_;
+  }
 
   std::size_t count_, next_ = 0;
-  double interval_;
+  double duration_, interval_;
 };
 
 /// Lets threads that wait sleep rather than spin. A step has some dozens of short parallel parts; where other

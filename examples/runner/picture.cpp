@@ -92,9 +92,10 @@ bool writePicture(const std::filesystem::path& path, const Scene& scene, const S
     picture.spheres.push_back(sphere);
     top = std::max(top, picture.view.up.dot(sphere.centre) + sphere.radius);
   }
-  for (const ScenePlane& plane : scene.planes) {
-    if (plane.colour) {
-      picture.planes.push_back({plane.normal, plane.offset, *plane.colour, top});
+  for (std::size_t i = 0; i < scene.planes.size(); ++i) {
+    if (scene.planes[i].colour) {
+      const Plane<double>& now = space.planes()[i];  // where it has travelled to
+      picture.planes.push_back({now.normal, now.offset, *scene.planes[i].colour, top});
     }
   }
   for (std::size_t i = 0; i < trails.size() && i < picture.spheres.size(); ++i) {

@@ -60,7 +60,7 @@ void addContacts(std::string& text, const Scene& scene, const Space<double>& spa
 
 void addGravity(std::string& text, const Scene& scene, const Space<double>& space, const History& history) {
   const std::size_t n = space.n();
-  if (!(space.getG() > 0.0) || n < 2 || n > 30000) {
+  if (!(space.getG() > 0.0) || n < 2 || n > 30000 || !space.domain().isOpen()) {  // images pull as well
     return;
   }
   if (n > 20 || history.mostContacts > 0) {
