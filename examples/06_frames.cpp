@@ -9,6 +9,10 @@
 
 int main(int argc, char** argv) {
   const int steps = argc > 1 ? std::atoi(argv[1]) : 1500;
+  if (steps < 1) {
+    std::printf("usage: 06_frames [steps, at least 1]\n");
+    return 2;
+  }
   gravel::scenes::CloudOptions cloud;
   cloud.count = 150;
   cloud.radius = 100.0;
