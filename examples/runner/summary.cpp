@@ -38,7 +38,14 @@ void addContacts(std::string& text, const Scene& scene, const Space<double>& spa
     text += format(", the deepest overlap is %.1e of a radius", deepestOverlap(space));
   }
   text += ".\n";
-  if (!(space.getG() > 0.0)) {
+  std::size_t asleep = 0;
+  for (const auto body : space.bodies()) {
+    asleep += body.isAsleep() ? 1 : 0;
+  }
+  if (asleep > 0) {
+    text += format("%zu of %zu bodies sleep; their own contacts are not counted.\n", asleep, n);
+  }
+  if (!(space.getG() > 0.0) || asleep > 0) {
     return;
   }
   const Cluster pile = largestCluster(space);

@@ -4,6 +4,7 @@
 /// Members of `Space` that carry out what a user decides of collisions.
 
 #include <gravel/contact/contact_outcomes.hpp>
+#include <gravel/dynamics/epicycle.hpp>
 #include <gravel/space/space.hpp>
 
 #include <unordered_map>
