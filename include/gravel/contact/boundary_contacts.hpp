@@ -83,7 +83,7 @@ class BoundaryContacts {
       if (touch && isMovable(bodies, i) &&
           (touch->gap < settings.margin ||
            mayRest(settings, {bodies.ids()[i], boundaryKey(wall.number)}, cursor) ||
-           isSlow<S>(settings, approach(), falls()))) {
+           mayBegin<S>(settings, touch->gap, radius, approach(), falls()))) {
         const std::uint32_t m = bodies.materials()[i];
         const std::uint32_t number = part.surfaces.of(
             m, wall.number, wall.velocity, [&] { return materials.pair(m, wall.surface, wall.material); });

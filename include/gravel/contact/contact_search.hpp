@@ -27,8 +27,9 @@ struct NarrowPhaseSettings {
   Scalar step = Scalar(0);
   /// Who rests on whom, sorted: only these stay contacts with a gap. Without it every pair so near does.
   std::optional<std::span<const ContactName>> resting = std::nullopt;
-  /// [m s^-1] If given, so do others that approach no faster than this and what (|a_1| + |a_2|) brings in a
-  /// step and a half: in half a step more it is two, above which a blow bounces, and at its own time.
+  /// [m s^-1] If given, so do others that touch, or approach no faster than this and what (|a_1| + |a_2|)
+  /// brings in a step and a half: in half a step more it is two, above which a blow bounces, and at its own
+  /// time.
   std::optional<Scalar> slow = std::nullopt;
   std::span<const ContactKeys> settled{};  ///< more of these, sorted
   std::span<const ContactName> before{};   ///< with which those found are compared: facts()
@@ -75,10 +76,13 @@ bool mayRest(const NarrowPhaseSettings<S>& settings, const ContactKeys& keys, Re
          std::binary_search(settings.settled.begin(), settings.settled.end(), keys);
 }
 
-/// \param approach [m s^-1] \param acceleration |a_1| + |a_2| [m s^-2]
+/// Who is a contact with a gap though it was none: see NarrowPhaseSettings::slow.
+/// \param radii [m] their sum \param approach [m s^-1] \param acceleration |a_1| + |a_2| [m s^-2]
 template <Real S>
-bool isSlow(const NarrowPhaseSettings<S>& settings, const S& approach, const S& acceleration) {
-  return settings.slow && !(S(2) * (approach - *settings.slow) > S(3) * acceleration * settings.step);
+bool mayBegin(const NarrowPhaseSettings<S>& settings, const S& gap, const S& radii, const S& approach,
+              const S& acceleration) {
+  return settings.slow && (!(gap > S(16) * Eigen::NumTraits<S>::epsilon() * radii) ||
+                           !(S(2) * (approach - *settings.slow) > S(3) * acceleration * settings.step));
 }
 
 inline constexpr std::size_t contactChunk = 1024;

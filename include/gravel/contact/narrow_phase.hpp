@@ -200,11 +200,11 @@ class NarrowPhase {
         !(detail::isMovable(bodies, i) || detail::isMovable(bodies, j))) {
       return;
     }
-    const auto isSlow = [&] {
+    const auto mayBegin = [&] {
       const Vector3<S> u = detail::velocityOf(bodies, j) - detail::velocityOf(bodies, i) + drift;
-      return detail::isSlow<S>(settings, S(-r_ij.dot(u) / distance), falls());
+      return detail::mayBegin<S>(settings, S(distance - reach), reach, S(-r_ij.dot(u) / distance), falls());
     };
-    if (!overlaps && !detail::mayRest(settings, keysOf(pair, bodies), cursor) && !isSlow()) {
+    if (!overlaps && !detail::mayRest(settings, keysOf(pair, bodies), cursor) && !mayBegin()) {
       return;
     }
     (void)materials[bodies.materials()[i]];  // refused while the list is what it was
