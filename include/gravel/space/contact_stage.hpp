@@ -53,8 +53,8 @@ class ContactStage {
     return wrapBodies(bodies, domain, time, field);
   }
 
-  /// Finds all contacts at the present positions, for steps of length h [s]. All pairs as near as what rests
-  /// that approach slowly are taken to rest; those of the last step alone, if `goesOn`.
+  /// Finds all contacts at the present positions, for steps of length h [s]. Of pairs as near as what rests
+  /// those of the last step are taken to rest, and, unless it `goesOn`, all that touch or approach slowly.
   void detect(const Bodies& bodies, const Config& config, const Scalar& time, const Scalar& h, bool goesOn,
               Profiler& profiler);
 
