@@ -74,10 +74,7 @@ class ContactEnergy {
     const Pack v_n = row.n.dot(v_rel);
     Pack across = row.jt.dot(slipVelocity(row, v_rel, v_n, b1, b2));
     if (!problem.turning.empty()) {
-      across = across + Pack::of([&](std::size_t lane) {
-                 const detail::TurningRow<S>& turning = problem.turning[group.row[lane]];
-                 return S(turning.l.dot(turning.q2 * b2.s.at(lane) - turning.q1 * b1.s.at(lane)));
-               });
+      across = across + row.l.dot(detail::TurningLanes<S>::load(problem.turning, group).rho(b1, b2));
     }
     return {row.jn * v_n, across};
   }
@@ -140,16 +137,13 @@ class ContactEnergy {
     const auto pushes = (row.jn > zero) & (normalMobility(b1, b2) > zero);
     row.jn = choose(pushes, row.jn, zero);
     row.jt = choose(pushes, row.jt, detail::PackedVector<S>::zero());
+    row.l = choose(pushes, row.l, detail::PackedVector<S>::zero());
     if (problem.passes) {
       problem.storeImpulses(group, row);
     }
     for (std::size_t lane = 0; lane < group.count; ++lane) {
       const std::uint32_t k = group.row[lane];
       problem.impulses().setImpact(k, problem.marks[k].impact);
-      if (!problem.turning.empty()) {
-        problem.turning[k].l = pushes[lane] ? problem.turning[k].l : Vector3<S>(Vector3<S>::Zero());
-        problem.impulses().setTurning(k, problem.turning[k].l);
-      }
     }
     const detail::PackedVector<S> drift = driftOf(problem, colouring, contacts, group);
     const auto [normal, across] = power(problem, group, row, b1, b2, drift);
@@ -255,9 +249,6 @@ class ContactEnergy {
       const S beta = islands_[islandOfRow_[k]].beta;
       if (beta < S(1)) {
         problem.impulses().scale(k, beta);
-        if (!problem.turning.empty()) {
-          problem.turning[k].l *= beta;
-        }
       }
     }
     for (std::uint32_t slot = 0; slot < colouring.bodies().size(); ++slot) {

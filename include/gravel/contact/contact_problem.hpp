@@ -8,6 +8,7 @@
 #include <gravel/contact/problem_bodies.hpp>
 #include <gravel/contact/resting_gap.hpp>
 #include <gravel/contact/row_lanes.hpp>
+#include <gravel/contact/turning_lanes.hpp>
 
 #include <vector>
 
@@ -112,34 +113,21 @@ class ContactProblem : public detail::ProblemBodies<S> {
   /// Rows with their impulses. \param all  none of them was passed over
   [[gnu::always_inline]] inline Lanes load(const Group& group, bool all) const {
     Lanes row = Lanes::load(rows, group);
-    row.setImpulse(detail::PackedQuad<S>::load([&](std::size_t lane) {
-      const std::uint32_t k = group.row[lane];
-      return all || marks[k].taken ? impulses_->quad(k) : last_->quad(k);
-    }));
+    detail::ImpulseList<S>::load(
+        group, row, !turning.empty(), [&](std::size_t k) -> const auto& {
+          return all || marks[k].taken ? *impulses_ : *last_;
+        });
     return row;
   }
   [[gnu::always_inline]] inline void storeImpulses(const Group& group, const Lanes& row) {
-    impulses_->store(group, row.impulse());
+    impulses_->store(group, row);
     for (std::size_t lane = 0; lane < group.count; ++lane) {
       marks[group.row[lane]].taken = true;
     }
   }
 
-  /// What sweeps begin with in these rows: the impulse of the last step again.
-  [[gnu::always_inline]] inline void takeGuess(const Group& group, Lanes& row, const detail::BodyLanes<S>& b1,
-                                               const detail::BodyLanes<S>& b2) const {
-    row.setImpulse(lastOf(group));
-    if (again) {
-      row.jt = choose(row.stick > Pack::zero(), row.jt, detail::PackedVector<S>::zero());
-      return;
-    }
-    const Pack zero = Pack::zero();
-    row.jn = choose((row.jn > zero) & (row.jn < Pack::all(this->mostGuess_)), row.jn, zero);
-    cutToCone(row, b1, b2);
-  }
-
   /// The square of the change that a sweep would make in velocities, at most; no bound, where it is still to
-  /// be asked who slides. Resistance to turning left out.
+  /// be asked who slides.
   [[gnu::always_inline]] inline Pack wrongAt(const Group& group, const Lanes& present) const;
 
   /// Makes these rows right while all others stand. The normal impulse leaves the slip as it is, so that both
@@ -214,12 +202,9 @@ class ContactProblem : public detail::ProblemBodies<S> {
     return {part(0), part(1), part(2)};
   }
 
-  /// The impulses of the last step by `ratio`, tangential and normal, in the problem's units.
-  [[gnu::always_inline]] inline detail::PackedQuad<S> lastOf(const Group& group) const {
-    detail::PackedQuad<S> past = last_->load(group);
-    const Pack by = Pack::all(ratio_);
-    return this->impulseIn(detail::PackedQuad<S>{by * past.x, by * past.y, by * past.z, by * past.w});
-  }
+  /// What sweeps begin with in these rows: the impulse of the last step again, by `ratio`.
+  [[gnu::always_inline]] inline void takeGuess(const Group& group, Lanes& row, const detail::BodyLanes<S>& b1,
+                                               const detail::BodyLanes<S>& b2) const;
 
   /// Brings nearer what rows from k on are taken up from.
   template <class B>
@@ -248,6 +233,10 @@ class ContactProblem : public detail::ProblemBodies<S> {
   template <class B>
   [[gnu::always_inline]] inline Lanes rowsOf(const Taking<B>& taking, const Group& group, const Pack& radius1,
                                              const Pack& radius2);
+
+  /// The same of what resists turning.
+  template <class B>
+  void fillTurning(const Taking<B>& taking, const Group& group, const Pack& radius1, const Pack& radius2);
 
   /// What the present velocities ask for. \param b1,b2 of `initial`: falls and radii in place of inverse
   /// masses and spins
@@ -300,7 +289,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
   /// Rows that were taken up, and their impulses.
   [[gnu::always_inline]] inline void put(const Group& group, const Lanes& row) {
     row.store(rows, group);
-    impulses_->store(group, row.impulse());
+    impulses_->store(group, row);
   }
 
   std::vector<S> gaps_;                           ///< [m] by row

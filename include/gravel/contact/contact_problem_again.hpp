@@ -50,9 +50,6 @@ void ContactProblem<S>::takeAgain(const Taking<B>& taking, const Group& group, M
   recallSlides(group, row);
   takeGuess(group, row, detail::BodyLanes<S>::load(bodies, group.slot1),
             detail::BodyLanes<S>::load(bodies, group.slot2));
-  for (std::size_t lane = 0; lane < group.count && !turning.empty(); ++lane) {
-    turning[group.row[lane]].l = impulseIn(Vector3<S>(ratio_ * last_->turning(group.row[lane])));
-  }
   put(group, row);
   most += Most{S(0), wrongAt(group, row).largest(), group.count};
 }
@@ -66,6 +63,9 @@ void ContactProblem<S>::fillAll(const Taking<B>& taking) {
     Lanes row = rowsOf(taking, group, radius1, radius2);
     row.target = Lanes::load(rows, group).target;
     row.store(rows, group);
+    if (!turning.empty()) {
+      fillTurning(taking, group, radius1, radius2);
+    }
   });
 }
 

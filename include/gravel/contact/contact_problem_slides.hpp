@@ -32,9 +32,14 @@ inline detail::RowSlides<S> ContactProblem<S>::slidesOf(const Group& group) cons
 template <Real S>
 inline auto ContactProblem<S>::wrongAt(const Group& group, const Lanes& present) const -> Pack {
   Lanes row = present;
-  const auto changes = change(group, row, detail::BodyLanes<S>::load(bodies, group.slot1),
-                              detail::BodyLanes<S>::load(bodies, group.slot2));
-  const Pack wrong = changes.change_sq();
+  const auto b1 = detail::BodyLanes<S>::load(bodies, group.slot1);
+  const auto b2 = detail::BodyLanes<S>::load(bodies, group.slot2);
+  const auto changes = change(group, row, b1, b2);
+  Pack wrong = changes.change_sq();
+  if (!turning.empty()) {
+    const auto turned = detail::TurningLanes<S>::load(turning, group).resist(row, b1, b2);
+    wrong = largerOf(wrong, turned.d_rho.squaredNorm());
+  }
   if (!grips) {
     return wrong;
   }

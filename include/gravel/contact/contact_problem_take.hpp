@@ -37,8 +37,8 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   slipTargets.assign(slips ? rows.size() : 0, Vector3<S>::Zero());
   detail::resizeSparingly(rests_, contacts.size());
   detail::resizeSparingly(approaches_, contacts.size());
-  passes = again && watch.holds() && sameScales_ && ratio == S(1) && turning.empty() && !kinds.spring &&
-           !drifting && way.bend.empty() && !this->isScaled() && settings.restitutionThreshold == threshold_;
+  passes = again && watch.holds() && sameScales_ && ratio == S(1) && !kinds.spring && !drifting &&
+           way.bend.empty() && !this->isScaled() && settings.restitutionThreshold == threshold_;
   threshold_ = settings.restitutionThreshold;
   const Taking<B> taking{contacts, source, colouring, dt, settings, fresh, way};
   Most most = detail::sumOverParts(
@@ -112,11 +112,8 @@ inline auto ContactProblem<S>::take(const Taking<B>& taking, const Group& group,
   const auto b1 = detail::BodyLanes<S>::load(initial, group.slot1);
   const auto b2 = detail::BodyLanes<S>::load(initial, group.slot2);
   Lanes row = taking.fresh ? rowsOf(taking, group, b1.spin, b2.spin) : Lanes::load(rows, group);
-  for (std::size_t lane = 0; lane < group.count && taking.fresh && !turning.empty(); ++lane) {
-    const Material<S>& material = taking.contacts.material(contactOf(taking, group, lane));
-    turning[group.row[lane]] =
-        detail::turningRow<S>(material, group.slot2[lane] == taking.colouring.staticSlot(), b1.spin[lane],
-                              b2.spin[lane], bodies[group.slot1[lane]].spin, bodies[group.slot2[lane]].spin);
+  if (taking.fresh && !turning.empty()) {
+    fillTurning(taking, group, b1.spin, b2.spin);
   }
   most += Most{aim(taking, group, row, b1, b2)};
   return row;
@@ -145,6 +142,17 @@ inline auto ContactProblem<S>::rowsOf(const Taking<B>& taking, const Group& grou
   row.stick = friction1([](const auto& m) { return m.staticFriction; });
   row.slide = friction1([](const auto& m) { return m.kineticFriction; });
   return row;
+}
+
+template <Real S>
+template <class B>
+void ContactProblem<S>::fillTurning(const Taking<B>& taking, const Group& group, const Pack& radius1,
+                                    const Pack& radius2) {
+  for (std::size_t lane = 0; lane < group.count; ++lane) {
+    const bool boundary = group.slot2[lane] == taking.colouring.staticSlot();
+    turning[group.row[lane]] = detail::TurningRow<S>::of(
+        taking.contacts.material(contactOf(taking, group, lane)), boundary, radius1[lane], radius2[lane]);
+  }
 }
 
 template <Real S>
@@ -187,9 +195,6 @@ inline S ContactProblem<S>::aim(const Taking<B>& taking, const Group& group, Lan
     const std::uint32_t k = group.row[lane];
     marks[k] = {.taken = true};
     rests_[k] = turned.counts[lane] ? RowRest::Not : load[lane] > S(0) ? RowRest::Loaded : RowRest::Free;
-    if (!turning.empty()) {
-      turning[k].l = turning[k].step = Vector3<S>::Zero();
-    }
   }
   if (fast.any()) {
     row.target = Pack::of([&](std::size_t lane) {
@@ -267,6 +272,33 @@ void ContactProblem<S>::aimSlip(const Taking<B>& taking, const Group& group, std
 }
 
 template <Real S>
+inline void ContactProblem<S>::takeGuess(const Group& group, Lanes& row, const detail::BodyLanes<S>& b1,
+                                         const detail::BodyLanes<S>& b2) const {
+  using Quad = detail::PackedQuad<S>;
+  using Vector = detail::PackedVector<S>;
+  const bool turns = !turning.empty() && last_->turns();
+  detail::ImpulseList<S>::load(
+      group, row, turns, [&](std::size_t) -> const auto& { return *last_; });
+  const Pack by = Pack::all(ratio_);
+  const Pack zero = Pack::zero();
+  const Quad push = this->impulseIn(Quad{by * row.jt.x, by * row.jt.y, by * row.jt.z, by * row.jn});
+  row.jt = Vector::of(push);
+  row.jn = push.w;
+  if (turns) {
+    row.l = Vector::of(this->impulseIn(Quad{by * row.l.x, by * row.l.y, by * row.l.z, zero}));
+  }
+  if (again) {
+    row.jt = choose(row.stick > zero, row.jt, Vector::zero());
+    return;
+  }
+  row.jn = choose((row.jn > zero) & (row.jn < Pack::all(this->mostGuess_)), row.jn, zero);
+  cutToCone(row, b1, b2);
+  if (turns) {
+    row.l = detail::TurningLanes<S>::load(turning, group).within(row, row.l);
+  }
+}
+
+template <Real S>
 template <class B>
 void ContactProblem<S>::takeWithGuess(const Taking<B>& taking, const Group& group, Most& most) {
   Lanes row = take(taking, group, most);
@@ -276,17 +308,11 @@ void ContactProblem<S>::takeWithGuess(const Taking<B>& taking, const Group& grou
   takeGuess(group, row, b1, b2);
   push(b1, b2, row.wholeImpulse());
   twist(row, b1, b2, row.jt);
+  if (!turning.empty()) {
+    turn(b1, b2, detail::TurningLanes<S>::load(turning, group).by(row.l, b1, b2));
+  }
   b1.store(bodies, group.slot1, friction);
   b2.store(bodies, group.slot2, friction);
-  for (std::size_t lane = 0; lane < group.count && !turning.empty(); ++lane) {
-    const std::uint32_t k = group.row[lane];
-    detail::TurningRow<S>& row2 = turning[k];
-    if (row.jn[lane] > S(0)) {
-      row2.l = resistTurning<S>(impulseIn(Vector3<S>(ratio_ * last_->turning(k))), row.n.at(lane),
-                                row.jn[lane], row2.rolling, row2.spinning);
-      detail::turn(row2, bodies[group.slot1[lane]], bodies[group.slot2[lane]], row2.l);
-    }
-  }
   put(group, row);
 }
 

@@ -29,7 +29,7 @@ class ImpulseList {
     if (!turns) {
       turning_.clear();
     } else if (turning_.size() != count) {
-      turning_.assign(count, Vector3<S>::Zero());
+      turning_.assign(count, Turn{});
     }
   }
 
@@ -48,7 +48,7 @@ class ImpulseList {
   const S& normal(std::size_t k) const { return pushes_[k].normal; }
   const Vector3<S>& tangential(std::size_t k) const { return pushes_[k].tangential; }
   Vector3<S> turning(std::size_t k) const {
-    return turning_.empty() ? Vector3<S>(Vector3<S>::Zero()) : turning_[k];
+    return turning_.empty() ? Vector3<S>(Vector3<S>::Zero()) : turning_[k].l;
   }
 
   ContactImpulse<S> get(std::size_t k) const {
@@ -60,20 +60,36 @@ class ImpulseList {
     pushes_[k] = {j.tangential, j.normal};
     impacts_[k] = j.impact ? 1 : 0;
     if (!turning_.empty()) {
-      turning_[k] = j.turning;
+      turning_[k].l = j.turning;
     }
   }
 
   /// Tangential and normal one of a row: four scalars.
   const S* quad(std::size_t k) const { return quadOf<S>(pushes_[k], 0); }
-  /// The same of these rows.
-  [[gnu::always_inline]] inline PackedQuad<S> load(const RowGroup<S>& group) const {
-    return PackedQuad<S>::load([&](std::size_t lane) { return quad(group.row[lane]); });
+  /// To the rows of a group those of them in listOf(k). \param turns  these lists do
+  template <class ListOf>
+  [[gnu::always_inline]] static inline void load(const RowGroup<S>& group, RowLanes<S>& row, bool turns,
+                                                 ListOf&& listOf) {
+    const auto push =
+        PackedQuad<S>::load([&](std::size_t lane) { return listOf(group.row[lane]).quad(group.row[lane]); });
+    row.jt = PackedVector<S>::of(push);
+    row.jn = push.w;
+    row.l = PackedVector<S>::zero();
+    if (turns) {
+      row.l = PackedVector<S>::of(PackedQuad<S>::load(
+          [&](std::size_t lane) { return quadOf<S>(listOf(group.row[lane]).turning_[group.row[lane]], 0); }));
+    }
   }
-  /// The same put here; what else they have is set by itself.
-  [[gnu::always_inline]] inline void store(const RowGroup<S>& group, const PackedQuad<S>& j) {
-    j.store([&](std::size_t lane) { return quadOf<S>(pushes_[group.row[lane]], 0); },
-            [&](std::size_t lane) { return group.holds(lane); });
+  /// Those of these rows put here; what else they have is set by itself.
+  [[gnu::always_inline]] inline void store(const RowGroup<S>& group, const RowLanes<S>& row) {
+    const auto put = [&](auto& quads, const PackedQuad<S>& quad) {
+      quad.store([&](std::size_t lane) { return quadOf<S>(quads[group.row[lane]], 0); },
+                 [&](std::size_t lane) { return group.holds(lane); });
+    };
+    put(pushes_, {row.jt.x, row.jt.y, row.jt.z, row.jn});
+    if (turns()) {
+      put(turning_, {row.l.x, row.l.y, row.l.z, Packed<S>::zero()});
+    }
   }
   void setPush(std::size_t k, const S& normal, const Vector3<S>& tangential) {
     pushes_[k] = {tangential, normal};
@@ -81,9 +97,11 @@ class ImpulseList {
   void scale(std::size_t k, const S& factor) {
     pushes_[k].normal *= factor;
     pushes_[k].tangential *= factor;
+    if (!turning_.empty()) {
+      turning_[k].l *= factor;
+    }
   }
   void setImpact(std::size_t k, bool impact) { impacts_[k] = impact ? 1 : 0; }
-  void setTurning(std::size_t k, const Vector3<S>& turning) { turning_[k] = turning; }
 
   /// All, entry placeOf(k) as the k-th.
   template <class PlaceOf>
@@ -101,9 +119,14 @@ class ImpulseList {
     S normal = S(0);
   };
 
+  struct Turn {  // so is this
+    Vector3<S> l = Vector3<S>::Zero();
+    S none = S(0);
+  };
+
   std::vector<Push> pushes_;
   std::vector<std::uint8_t> impacts_;
-  std::vector<Vector3<S>> turning_;  ///< empty where nothing turns
+  std::vector<Turn> turning_;  ///< empty where nothing turns
 };
 
 }  // namespace gravel::detail

@@ -48,8 +48,6 @@ class ProblemBodies {
   /// Impulses and energies in SI units from those of the scaled problem, and back.
   S impulseOut(const S& j) const { return scaled<S>(j, -speedExponent_ - massExponent_); }
   Vector3<S> impulseOut(const Vector3<S>& j) const { return scaled<S>(j, -speedExponent_ - massExponent_); }
-  S impulseIn(const S& j) const { return scaled<S>(j, speedExponent_ + massExponent_); }
-  Vector3<S> impulseIn(const Vector3<S>& j) const { return scaled<S>(j, speedExponent_ + massExponent_); }
   bool isScaled() const { return speedExponent_ != 0 || massExponent_ != 0; }
   S energyOut(const S& e) const { return scaled<S>(e, -2 * speedExponent_ - massExponent_); }
   S speedIn(const S& v) const { return scaled<S>(v, speedExponent_); }
@@ -57,9 +55,6 @@ class ProblemBodies {
   Packed<S> speedIn(const Packed<S>& v) const { return scaledLanes(v, speedExponent_); }
   PackedQuad<S> impulseIn(const PackedQuad<S>& j) const {
     return scaledLanes(j, speedExponent_ + massExponent_);
-  }
-  PackedQuad<S> impulseOut(const PackedQuad<S>& j) const {
-    return scaledLanes(j, -speedExponent_ - massExponent_);
   }
 
  protected:

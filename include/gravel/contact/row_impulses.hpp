@@ -69,22 +69,18 @@ struct RowImpulses {
     return {changes.du.squaredNorm()[0]};
   }
 
-  /// Resistance to rolling and spinning of a row for its normal impulse, first on by `beta` of its last step.
-  static Progress resist(ContactProblem<S>& problem, std::size_t k, Body& b1, Body& b2, const S& beta) {
-    TurningRow<S>& row = problem.turning[k];
-    if (!(row.mass > S(0))) {
-      return {};
-    }
-    row.l += beta * row.step;
-    const Vector3<S> l = resistTurning<S>(Vector3<S>(row.l - row.mass * row.rho(b1, b2)), problem.rows[k].n,
-                                          problem.impulses().normal(k), row.rolling, row.spinning);
-    const Vector3<S> dl = l - row.l;
-    row.l = l;
-    turn(row, b1, b2, dl);
-    const Vector3<S> change = dl / row.mass;
-    const S along = change.dot(row.step);
-    row.step = beta * row.step + dl;
-    return {change.squaredNorm(), change.dot(dl), along};
+  /// Resistance to turning of row k alone, for its normal impulse.
+  static Progress resist(ContactProblem<S>& problem, const ContactColoring& colouring, std::size_t k) {
+    const Group group = Group::from(colouring.rows(), k, k + 1, colouring.staticSlot());
+    Lanes row = problem.load(group, true);
+    auto b1 = BodyLanes<S>::load(problem.bodies, group.slot1);
+    auto b2 = BodyLanes<S>::load(problem.bodies, group.slot2);
+    const auto changes = TurningLanes<S>::load(problem.turning, group).resist(row, b1, b2);
+    turn(b1, b2, changes);
+    problem.storeImpulses(group, row);
+    b1.store(problem.bodies, group.slot1, true);
+    b2.store(problem.bodies, group.slot2, true);
+    return {changes.d_rho.squaredNorm()[0]};
   }
 
   /// Takes down how far bodies were moved at most.
@@ -94,30 +90,6 @@ struct RowImpulses {
       if (bodies.inverseMass[lane] > S(0)) {
         problem.watch.move(slots[lane], ways[lane]);
       }
-    }
-  }
-
-  /// Resistance to turning of the rows of a group, which are relaxed otherwise.
-  template <bool Watched>
-  static void resistAll(ContactProblem<S>& problem, const Group& group, const S& beta, Progress& progress) {
-    using std::sqrt;
-    for (std::size_t lane = 0; lane < group.count; ++lane) {
-      const std::uint32_t k = group.row[lane];
-      Body& b1 = problem.bodies[group.slot1[lane]];
-      Body& b2 = problem.bodies[group.slot2[lane]];
-      TurningRow<S>& row = problem.turning[k];
-      const Progress resisted = resist(problem, k, b1, b2, Watched ? S(0) : beta);
-      if constexpr (Watched) {
-        const S l = row.mass * S(sqrt(resisted.change_sq));
-        if (b1.inverseMass > S(0)) {
-          problem.watch.move(group.slot1[lane], row.q1 * b1.spin * l);
-        }
-        if (b2.inverseMass > S(0)) {
-          problem.watch.move(group.slot2[lane], row.q2 * b2.spin * l);
-        }
-        progress.changed += resisted.change_sq > problem.watch.still() * problem.watch.still() ? 1U : 0U;
-      }
-      progress += resisted;
     }
   }
 };

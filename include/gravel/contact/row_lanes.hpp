@@ -121,6 +121,7 @@ struct RowLanes {
   P slide;
   PackedVector<S> jt = PackedVector<S>::zero();
   P jn = P::zero();
+  PackedVector<S> l = PackedVector<S>::zero();  ///< against turning, if anything resists that
 
   /// Without an impulse.
   [[gnu::always_inline]] static inline RowLanes load(const std::vector<SolverRow<S>>& rows,
@@ -143,11 +144,6 @@ struct RowLanes {
     put(1, {c2, target, stick, slide});
   }
 
-  [[gnu::always_inline]] inline void setImpulse(const PackedQuad<S>& j) {
-    jt = PackedVector<S>::of(j);
-    jn = j.w;
-  }
-  [[gnu::always_inline]] inline PackedQuad<S> impulse() const { return {jt.x, jt.y, jt.z, jn}; }
   [[gnu::always_inline]] inline PackedVector<S> wholeImpulse() const { return jn * n + jt; }
 };
 

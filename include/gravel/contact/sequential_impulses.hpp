@@ -8,6 +8,7 @@
 
 #include <gravel/contact/contact_energy.hpp>
 #include <gravel/contact/row_impulses.hpp>
+#include <gravel/contact/sweep_momentum.hpp>
 
 namespace gravel {
 
@@ -40,6 +41,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
   using typename Base::Progress;
   using typename Base::Row;
   using Pack = detail::Packed<S>;
+  using Step = typename detail::SweepMomentum<S>::Step;
 
  public:
   static constexpr const char* name() { return "sequential impulses"; }
@@ -68,7 +70,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     const std::size_t count = problem.rows.size() - colouring.loneCount();
     // What is only just content would never become better, and a heap at rest creep by it.
     const S right = enough / S(16);
-    if (problem.again && problem.turning.empty() && !(problem.wrong_sq > right * right)) {
+    if (problem.again && !(problem.wrong_sq > right * right)) {
       report.iterations = 1;  // one that would change nothing
       report.looks += problem.looks;
       problem.kept = problem.passes;
@@ -111,23 +113,22 @@ class SequentialImpulses : private detail::RowImpulses<S> {
           problem.passes = false;
         }
         if (!local && accelerate) {
-          begin(problem);
+          momentum_.begin(problem);
         }
       } else if (accelerate && report.iterations == 1) {
-        begin(problem);
+        momentum_.begin(problem);
         before = more ? S(0) : now.size;
       } else if (accelerate) {
         const S next = more ? S(0) : shareAfter(now, before, beta, bare);
         bare = !more && beta == S(0);
         beta = next;
         before = more ? S(0) : now.size;
-        coast(problem, beta);
+        momentum_.coast(problem, beta);
       }
     }
   }
 
  private:
-  static constexpr std::size_t chunk = 512;
   static constexpr std::size_t few = 8;  ///< one contact in so many
 
   /// The share of a sweep's step with which the next one begins.
@@ -142,58 +143,6 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     }
     // At high mass ratios changes fall by less than their rounding: that is no reason to begin anew.
     return now.size < S(1.001) * before ? std::min<S>(S(1), now.size / before) : S(0);
-  }
-
-  /// A body's velocities at the end of the last sweep.
-  struct BodySwept {
-    Vector3<S> v;
-    Vector3<S> s;
-  };
-
-  /// Of the impulses of a row, from sweep to sweep: a quad of scalars.
-  struct RowStep {
-    Vector3<S> t = Vector3<S>::Zero();
-    S n = S(0);
-  };
-  struct StepLanes {
-    detail::PackedVector<S> t = detail::PackedVector<S>::zero();
-    Pack n = Pack::zero();
-  };
-
-  StepLanes loadStep(const Group& group) const {
-    const auto quad = detail::PackedQuad<S>::load(
-        [&](std::size_t lane) { return detail::quadOf<S>(steps_[group.row[lane]], 0); });
-    return {detail::PackedVector<S>::of(quad), quad.w};
-  }
-  void storeStep(const Group& group, const StepLanes& step) {
-    detail::PackedQuad<S>{step.t.x, step.t.y, step.t.z, step.n}.store(
-        [&](std::size_t lane) { return detail::quadOf<S>(steps_[group.row[lane]], 0); },
-        [&](std::size_t lane) { return group.holds(lane); });
-  }
-
-  /// Steps are kept from here on.
-  void begin(const ContactProblem<S>& problem) {
-    steps_.assign(problem.rows.size(), RowStep{});
-    detail::resizeAnew(swept_, problem.bodies.size());
-    parallelFor(problem.bodies.size(), chunk, [&](std::size_t slot) {
-      swept_[slot] = BodySwept{problem.bodies[slot].v, problem.bodies[slot].s};
-    });
-  }
-
-  /// Velocities follow the impulses beyond their last step: they are linear in the impulses.
-  void coast(ContactProblem<S>& problem, const S& beta) {
-    parallelFor(problem.bodies.size(), chunk, [&](std::size_t slot) {
-      BodySwept& last = swept_[slot];
-      Body& b = problem.bodies[slot];
-      const Vector3<S> dv = b.v - last.v;
-      last.v = b.v;
-      b.v += beta * dv;
-      if (problem.friction) {
-        const Vector3<S> ds = b.s - last.s;
-        last.s = b.s;
-        b.s += beta * ds;
-      }
-    });
   }
 
   /// A contact alone: in two strokes, stop and rebound, so that a head-on blow ends at exactly its target.
@@ -220,13 +169,13 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     if (row.stick > S(0)) {
       rub(problem, colouring, k);
     }
-    if (!problem.turning.empty() && problem.turning[k].mass > S(0)) {
+    if (!problem.turning.empty()) {
       // Friction and resistance act on one spin: in turns, each taking 2/7 or more off what is left.
       const S speed =
           detail::maxAbs(b1.s) + detail::maxAbs(b2.s) + detail::maxAbs(b1.v) + detail::maxAbs(b2.v);
       const S enough = Eigen::NumTraits<S>::epsilon() * speed;
       for (int turn = 0; turn < 200; ++turn) {
-        Progress progress = resist(problem, k, b1, b2, S(0));
+        Progress progress = resist(problem, colouring, k);
         if (row.stick > S(0)) {
           progress += rub(problem, colouring, k);
         }
@@ -266,17 +215,15 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     Lanes row = problem.load(group, !problem.passes);
     auto b1 = detail::BodyLanes<S>::load(problem.bodies, group.slot1);
     auto b2 = detail::BodyLanes<S>::load(problem.bodies, group.slot2);
-    StepLanes step, last;
+    Step step, last;
     if constexpr (!Watched) {
-      last = loadStep(group);
-      step.n = Pack::all(beta) * last.n;
-      step.t = Pack::all(beta) * last.t;
+      last = momentum_.load(group);
+      step = beta * last;
       row.jn = row.jn + step.n;
       row.jt = row.jt + step.t;
+      row.l = row.l + step.l;
     }
     const detail::RowChanges<S> changes = problem.change(group, row, b1, b2);
-    step.n = step.n + changes.dj;
-    step.t = step.t + changes.dt;
     push(b1, b2, changes.dj * row.n + changes.dt);
     if (problem.friction) {
       if (problem.grips) {
@@ -284,26 +231,29 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       }
       twist(row, b1, b2, changes.dt);
     }
+    detail::TurningChanges<S> turned;
+    if (!problem.turning.empty()) {
+      turned = detail::TurningLanes<S>::load(problem.turning, group).resist(row, b1, b2);
+      turn(b1, b2, turned);
+    }
     b1.store(problem.bodies, group.slot1, problem.friction);
     b2.store(problem.bodies, group.slot2, problem.friction);
     problem.storeImpulses(group, row);
     Progress progress;
-    const Pack change_sq = changes.change_sq();
+    const Pack change_sq = largerOf(changes.change_sq(), turned.d_rho.squaredNorm());
     progress.change_sq = change_sq.largest();
-    progress.size = (changes.dj * changes.approach + changes.dt.dot(changes.du)).sum();
+    progress.size =
+        (changes.dj * changes.approach + changes.dt.dot(changes.du) + turned.dl.dot(turned.d_rho)).sum();
     if constexpr (!Watched) {
-      progress.along = (last.n * changes.approach + last.t.dot(changes.du)).sum();
-      storeStep(group, step);
+      progress.along = (last.n * changes.approach + last.t.dot(changes.du) + last.l.dot(turned.d_rho)).sum();
+      momentum_.store(group, step + Step{changes.dj, changes.dt, turned.dl});
     } else {
       const Pack push_t = changes.dt.sumAbs();  // |its part across n|, or more
       const Pack push = sizeOf(changes.dj) + push_t;
-      watchMoves(problem, group.slot1, b1, b1.inverseMass * push + row.c1 * b1.spin * push_t);
-      watchMoves(problem, group.slot2, b2, b2.inverseMass * push + row.c2 * b2.spin * push_t);
-    }
-    if (!problem.turning.empty()) {
-      Base::template resistAll<Watched>(problem, group, beta, progress);
-    }
-    if constexpr (Watched) {
+      watchMoves(problem, group.slot1, b1,
+                 b1.inverseMass * push + row.c1 * b1.spin * push_t + turned.ds1.sumAbs());
+      watchMoves(problem, group.slot2, b2,
+                 b2.inverseMass * push + row.c2 * b2.spin * push_t + turned.ds2.sumAbs());
       const S still_sq = problem.watch.still() * problem.watch.still();
       for (std::size_t lane = 0; lane < group.count; ++lane) {
         problem.watch.enter(group.row[lane], group.slot1[lane], group.slot2[lane]);
@@ -313,8 +263,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     sum += progress;
   }
 
-  std::vector<BodySwept> swept_;
-  std::vector<RowStep> steps_;  ///< of sweeps with momentum
+  detail::SweepMomentum<S> momentum_;
 };
 
 }  // namespace gravel

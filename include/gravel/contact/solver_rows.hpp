@@ -118,40 +118,10 @@ struct RowMark {
   static constexpr std::uint8_t patience = 8;
 };
 
-/// Resistance to rolling and spinning of a row; see resistTurning().
-template <Real S>
-struct TurningRow {
-  S q1 = S(0);  ///< effective radius / radius
-  S q2 = S(0);
-  S mass = S(0);  ///< 1/(q1^2/(k1 m1) + q2^2/(k2 m2))
-  S rolling = S(0);
-  S spinning = S(0);
-  Vector3<S> l = Vector3<S>::Zero();
-  Vector3<S> step = Vector3<S>::Zero();
-
-  template <class B>
-  Vector3<S> rho(const B& b1, const B& b2) const {
-    return q2 * b2.s - q1 * b1.s;
-  }
-};
-
 /// 1/x; 0 of 0. Not `inverse`, a name by which Eigen would take its own scalars for arrays.
 template <Real S>
 S reciprocal(const S& x) {
   return x > S(0) ? S(1) / x : S(0);
-}
-
-/// \param boundary in place of the second: flat, where a point would be sharp
-template <Real S>
-TurningRow<S> turningRow(const Material<S>& material, bool boundary, const S& r1, const S& r2, const S& spin1,
-                         const S& spin2) {
-  TurningRow<S> row;
-  row.q1 = boundary ? S(1) : S(r2 / (r1 + r2));
-  row.q2 = boundary ? S(0) : S(r1 / (r1 + r2));
-  row.mass = reciprocal<S>(row.q1 * row.q1 * spin1 + row.q2 * row.q2 * spin2);
-  row.rolling = material.rollingFriction;
-  row.spinning = material.spinningFriction;
-  return row;
 }
 
 /// 1/m1 + 1/m2.
@@ -176,17 +146,6 @@ template <class R, class V, class N, class B>
 [[gnu::always_inline]] inline V slipVelocity(const R& row, const V& v_rel, const N& v_n, const B& b1,
                                              const B& b2) {
   return V(V(v_rel - V(v_n * row.n)) - V(V(row.c1 * b1.s) + V(row.c2 * b2.s)).cross(row.n));
-}
-
-template <Real S>
-[[gnu::always_inline]] inline void turn(const TurningRow<S>& row, SolverBody<S>& b1, SolverBody<S>& b2,
-                                        const Vector3<S>& l) {
-  if (b1.inverseMass > S(0)) {
-    b1.s -= (row.q1 * b1.spin) * l;
-  }
-  if (b2.inverseMass > S(0)) {
-    b2.s += (row.q2 * b2.spin) * l;
-  }
 }
 
 /// x 2^exponent, exactly; a scalar that is not built in stays as it is.
