@@ -8,8 +8,8 @@
 using namespace gravel;
 using namespace gravel::test;
 
-// Seen to fail: spinning friction used for rolling; a row that does not press resists; what is within its limit
-// not kept; the spins of the two sides exchanged.
+// Seen to fail: spinning friction used for rolling; a row that does not press resists; what is within its
+// limit not kept; the spins of the two sides exchanged.
 TEMPLATE_TEST_CASE("rows side by side resist turning as each does by itself", "",
                    GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
