@@ -13,19 +13,19 @@ using namespace gravel::test;
 TEMPLATE_TEST_CASE("rows side by side resist turning as each does by itself", "",
                    GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
-  using Vec = Vector3<S>;
+  using V = Vector3<S>;
   constexpr std::size_t width = detail::RowGroup<S>::width;
   const CounterRandom random(5);
   std::uint64_t counter = 0;
   const auto one = [&] { return S(random.uniform(counter++, -1, 1)); };
-  const auto any = [&] { return Vec(one(), one(), one()); };
+  const auto any = [&] { return V(one(), one(), one()); };
   std::size_t cut = 0;
   std::size_t kept = 0;
   for (int round = 0; round < 300; ++round) {
     std::vector<detail::SolverRow<S>> rows(width);
     std::vector<detail::SolverBody<S>> bodies(2 * width);
     std::vector<detail::TurningRow<S>> turning(width);
-    std::array<Vec, width> before;
+    std::array<V, width> before;
     std::array<S, width> load;
     detail::RowGroup<S> group;
     for (std::size_t lane = 0; lane < width; ++lane) {
@@ -56,12 +56,12 @@ TEMPLATE_TEST_CASE("rows side by side resist turning as each does by itself", ""
       const auto& [q1, q2, rolling, spinning] = turning[lane];
       const detail::SolverBody<S>& first = bodies[lane];
       const detail::SolverBody<S>& second = bodies[lane + width];
-      const Vec rho = q2 * second.s - q1 * first.s;
+      const V rho = q2 * second.s - q1 * first.s;
       const S mass = 1 / (q1 * q1 * first.spin + q2 * q2 * second.spin);
-      const Vec stops = before[lane] - mass * rho;
-      const Vec l = resistTurning<S>(stops, rows[lane].n, load[lane], rolling, spinning);
-      const Vec ds1 = -(q1 * first.spin) * (l - before[lane]);
-      const Vec ds2 = (q2 * second.spin) * (l - before[lane]);
+      const V stops = before[lane] - mass * rho;
+      const V l = resistTurning<S>(stops, rows[lane].n, load[lane], rolling, spinning);
+      const V ds1 = -(q1 * first.spin) * (l - before[lane]);
+      const V ds2 = (q2 * second.spin) * (l - before[lane]);
       const S rounding = 16 * Eigen::NumTraits<S>::epsilon();
       CHECK((row.l.at(lane) - l).norm() <= rounding * stops.norm());
       CHECK((b1.s.at(lane) - first.s - ds1).norm() <=

@@ -67,9 +67,9 @@ struct CollisionOutcome {
 };
 
 /// The user's own outcome of the collisions of two bodies. It is called from one thread, once for each impact
-/// in the order in which they are dealt, and must not change the space. Contacts that rest are no collisions.
-/// What it throws, or a velocity that is not finite (std::invalid_argument), ends the step half way: bodies
-/// have moved then, and the time has not.
+/// in the order in which they are dealt, and must not change the space, which refuses that. Contacts that
+/// rest are no collisions. What it throws, or a velocity that is not finite (std::invalid_argument), ends the
+/// step half way: bodies have moved then, and the time has not.
 template <Real Scalar>
 using CollisionHook = Callback<CollisionOutcome<Scalar>(const Collision<Scalar>&)>;
 

@@ -18,8 +18,9 @@ namespace gravel {
 /// The user's own force: adds to `bodies.forces()` [N] and `bodies.torques()` [N m] at time t [s]. It is
 /// called from one thread once per force evaluation, with the velocities of that moment as far as they are
 /// known (in methods of several drifts those of a stage); mind that it may read them and must change nothing
-/// else. Massless tracers have no force to add to. What it throws, or a force that is not
-/// finite (std::invalid_argument), ends the step half way: bodies have moved then, and the time has not.
+/// else. Massless tracers have no force to add to. What it throws, a force that is not finite
+/// (std::invalid_argument), or another number of bodies (std::logic_error) ends the step half way: bodies
+/// have moved then, and the time has not.
 template <Real Scalar, class Layout>
 using ForceHook = Callback<void(Bodies<Scalar, Layout>&, Scalar)>;
 
@@ -212,8 +213,15 @@ class ForceStage {
     show(bodies, ahead_);
     try {
       hook(bodies, time);
+      if (bodies.size() != n) {
+        throw std::logic_error(detail::faultText("number of bodies after the force hook",
+                                                 std::to_string(bodies.size()),
+                                                 "the " + std::to_string(n) + " before it"));
+      }
     } catch (...) {
-      show(bodies, now_);
+      if (bodies.size() == n) {
+        show(bodies, now_);
+      }
       throw;
     }
     show(bodies, now_);

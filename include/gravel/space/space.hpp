@@ -32,6 +32,7 @@ namespace gravel {
 /// Bodies are reached by index, 0 … n()-1 (removal and reordering change it), or by id, which stays. What is
 /// written through proxies between steps is checked at the next step. A space is driven by one thread; the
 /// work inside is shared between OpenMP's threads, and the result is the same bits for any number of them.
+/// Whatever changes it throws std::logic_error when a hook calls it, inside a step.
 template <Real Scalar = double, class Layout = SoA>
 class Space : public Settings<Scalar> {
  public:
@@ -64,7 +65,10 @@ class Space : public Settings<Scalar> {
   Bodies& getBodiesForTest() { return bodies_; }
 
   /// Room for n bodies in all: saves time and up to half of their memory where many are added one by one.
-  void reserve(std::size_t n) { bodies_.reserve(n); }
+  void reserve(std::size_t n) {
+    this->inStep_.refuse("reserve()");
+    bodies_.reserve(n);
+  }
   /// \throws std::invalid_argument naming the field, its value and what is allowed; then nothing is added
   BodyId addBody(const Body<Scalar>& body);
   /// The last body takes its index. Its energy is booked as `exchange`; where somebody's numbers are not
@@ -92,6 +96,7 @@ class Space : public Settings<Scalar> {
   /// one counts. What a moving plane does to bodies is booked in the ledger as `work`.
   /// \throws std::out_of_range as above; std::invalid_argument for a velocity that is not finite
   void setPlaneVelocity(std::size_t plane, const Vector& velocity) {
+    this->inStep_.refuse("setPlaneVelocity()");
     contact_.setPlaneVelocity(plane, velocity);
   }
   /// As they stand now, in the order of their numbers.
@@ -100,10 +105,7 @@ class Space : public Settings<Scalar> {
   MaterialId addMaterial(const Material<Scalar>& material);
   /// From now on these two, or two surfaces of one, have measured coefficients in place of the mixed ones.
   /// \throws std::invalid_argument on coefficients out of range, and for what is no material
-  void setPairMaterial(MaterialId a, MaterialId b, const Material<Scalar>& material) {
-    contact_.materials.setPair(a, b, material);
-    wakeAll();
-  }
+  void setPairMaterial(MaterialId a, MaterialId b, const Material<Scalar>& material);
   /// One of them alone, and what two are to each other. \throws std::invalid_argument for what is no material
   Material<Scalar> material(MaterialId id) const { return contact_.materials.get(id, this->config_); }
   Material<Scalar> pairMaterial(MaterialId a, MaterialId b) const {
@@ -118,7 +120,10 @@ class Space : public Settings<Scalar> {
   /// empty one takes it away again. Two that merge become one at the end of the step (see `merged()`): of
   /// them the fixed one keeps its id, else the heavier, else the one of the smaller id. The energy of motion
   /// that is lost is booked as `restitution`, that of the potential as `exchange`.
-  void setCollisionHook(CollisionHook<Scalar> hook) { contact_.collisionHook = std::move(hook); }
+  void setCollisionHook(CollisionHook<Scalar> hook) {
+    this->inStep_.refuse("setCollisionHook()");
+    contact_.collisionHook = std::move(hook);
+  }
   /// Open, periodic or shear-periodic. A shear-periodic one is a patch of a disc in Hill's frame: positions,
   /// velocities and spins are those in the frame, its potential is part of the potential energy, and the
   /// shear does its `work` where bodies or contacts cross an edge in x. With gravity the images of all bodies
@@ -129,7 +134,10 @@ class Space : public Settings<Scalar> {
 
   /// Every body is awake again before the next step (see space/sleep_stage.hpp). Changes of forces and planes
   /// do so by themselves, changes of bodies for those that they concern.
-  void wakeAll() { sleep_.wakeAll(); }
+  void wakeAll() {
+    this->inStep_.refuse("wakeAll()");
+    sleep_.wakeAll();
+  }
 
   // Time.
 

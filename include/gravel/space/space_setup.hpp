@@ -47,6 +47,7 @@ std::size_t Space<Scalar, Layout>::checkedIndex(std::size_t i) const {
 
 template <Real Scalar, class Layout>
 BodyId Space<Scalar, Layout>::addBody(const Body<Scalar>& body) {
+  this->inStep_.refuse("addBody()");
   contact_.materials.check(static_cast<std::uint32_t>(body.material), "the new body");
   const BodyId id = bodies_.add(body);
   forcesValid_ = false;
@@ -63,6 +64,7 @@ BodyId Space<Scalar, Layout>::addBody(const Body<Scalar>& body) {
 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::removeBody(BodyId id) {
+  this->inStep_.refuse("removeBody()");
   const std::size_t i = bodies_.indexOf(id);
   bool known = ledgerOpen_;
   for (std::size_t k = 0; known && !(getG() == Scalar(0)) && k < n(); ++k) {
@@ -78,6 +80,7 @@ void Space<Scalar, Layout>::removeBody(BodyId id) {
 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::reorderBodies() {
+  this->inStep_.refuse("reorderBodies()");
   forcesValid_ = forcesValid_ && !placesChanged();
   bodies_.reorder(mortonOrder(bodies_.positions()));
   contact_.renumber(bodies_);
@@ -88,6 +91,7 @@ void Space<Scalar, Layout>::reorderBodies() {
 
 template <Real Scalar, class Layout>
 std::size_t Space<Scalar, Layout>::addPlane(const Vector& normal, Scalar offset, MaterialId material) {
+  this->inStep_.refuse("addPlane()");
   contact_.materials.check(static_cast<std::uint32_t>(material), "the new plane");
   const Plane<Scalar> plane = makePlane(normal, offset, material);
   wakeAll();
@@ -97,6 +101,7 @@ std::size_t Space<Scalar, Layout>::addPlane(const Vector& normal, Scalar offset,
 template <Real Scalar, class Layout>
 std::vector<std::size_t> Space<Scalar, Layout>::addBox(const Vector& low, const Vector& high,
                                                        MaterialId material, BoxFaces open) {
+  this->inStep_.refuse("addBox()");
   contact_.materials.check(static_cast<std::uint32_t>(material), "the new box");
   const auto faces = makeBox(low, high, material, open);
   wakeAll();
@@ -109,6 +114,7 @@ std::vector<std::size_t> Space<Scalar, Layout>::addBox(const Vector& low, const 
 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::removePlane(std::size_t plane) {
+  this->inStep_.refuse("removePlane()");
   contact_.boundaries.remove(plane);
   wakeAll();
   forcesValid_ = false;  // contacts are looked for again before the next step
@@ -116,11 +122,20 @@ void Space<Scalar, Layout>::removePlane(std::size_t plane) {
 
 template <Real Scalar, class Layout>
 MaterialId Space<Scalar, Layout>::addMaterial(const Material<Scalar>& material) {
+  this->inStep_.refuse("addMaterial()");
   return contact_.materials.add(material);
 }
 
 template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::setPairMaterial(MaterialId a, MaterialId b, const Material<Scalar>& material) {
+  this->inStep_.refuse("setPairMaterial()");
+  contact_.materials.setPair(a, b, material);
+  wakeAll();
+}
+
+template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::setUniformField(const Vector& g) {
+  this->inStep_.refuse("setUniformField()");
   if (!isFinite(g)) {
     detail::refuse("uniform field", detail::formatVector(g), "finite");
   }
@@ -129,6 +144,7 @@ void Space<Scalar, Layout>::setUniformField(const Vector& g) {
 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::setForceHook(ForceHook<Scalar, Layout> hook) {
+  this->inStep_.refuse("setForceHook()");
   force_.hook = std::move(hook);
   wakeAll();
   for (std::size_t i = 0; i < n() && !force_.hook; ++i) {
@@ -151,6 +167,7 @@ void Space<Scalar, Layout>::checkIntegratorIn(const Domain<Scalar>& domain) cons
 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::setDomain(const Domain<Scalar>& domain) {
+  this->inStep_.refuse("setDomain()");
   checkIntegratorIn(domain);
   const bool turns = HillFrame<Scalar>(domain).turns() || HillFrame<Scalar>(contact_.domain).turns();
   if (turns || !(getG() == Scalar(0))) {
@@ -164,6 +181,7 @@ void Space<Scalar, Layout>::setDomain(const Domain<Scalar>& domain) {
 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::setG(Scalar g) {
+  this->inStep_.refuse("setG()");
   SimulationConfig<Scalar> next = this->config_;
   next.G = g;
   next.validate();

@@ -223,6 +223,7 @@ void Space<Scalar, Layout>::save(const std::string& path) const {
 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::restore(const std::string& path) {
+  this->inStep_.refuse("restore()");
   SnapshotReader in(path);
   SimulationConfig<Scalar> config;
   forEachSetting(config, [&]<class T>(const Setting<Scalar>& setting, T& value) {

@@ -27,16 +27,20 @@ namespace gravel {
 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::computeDynamics(std::size_t iteration) {
+  this->inStep_.refuse("computeDynamics()");
+  const detail::StepInProgress::Scope inside(this->inStep_);
   prepare();
   step(dt_, iteration);
 }
 
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::advanceTo(Scalar time) {
+  this->inStep_.refuse("advanceTo()");
   if (!isFinite(time) || time < time_) {
     detail::refuse("time to advance to", detail::formatReal(time),
                    "finite, at least the present time " + detail::formatReal(time_));
   }
+  const detail::StepInProgress::Scope inside(this->inStep_);
   while (time_ < time) {
     prepare();
     const Scalar rest = time - time_;
