@@ -38,7 +38,8 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   detail::resizeSparingly(rests_, contacts.size());
   detail::resizeSparingly(approaches_, contacts.size());
   passes = again && watch.holds() && sameScales_ && ratio == S(1) && !kinds.spring && !drifting &&
-           way.bend.empty() && !this->isScaled() && settings.restitutionThreshold == threshold_;
+           way.bend.empty() && !this->isScaled() && settings.restitutionThreshold == threshold_ &&
+           (turning.empty() || last.turns());
   threshold_ = settings.restitutionThreshold;
   const Taking<B> taking{contacts, source, colouring, dt, settings, fresh, way};
   Most most = detail::sumOverParts(
