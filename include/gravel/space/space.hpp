@@ -32,7 +32,7 @@ namespace gravel {
 /// Bodies are reached by index, 0 … n()-1 (removal and reordering change it), or by id, which stays. What is
 /// written through proxies between steps is checked at the next step. A space is driven by one thread; the
 /// work inside is shared between OpenMP's threads, and the result is the same bits for any number of them.
-/// Whatever changes it throws std::logic_error when a hook calls it, inside a step.
+/// Whatever changes it throws std::logic_error inside a step, where hooks and the log could call it.
 template <Real Scalar = double, class Layout = SoA>
 class Space : public Settings<Scalar> {
  public:
