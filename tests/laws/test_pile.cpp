@@ -213,6 +213,7 @@ TEST_CASE("A heap at rest does not notice one step much shorter than the others,
   SimulationConfig<double> config = plain(2e-3);
   config.coeffFriction = config.coeffStaticFriction = 0.5;
   config.rollingFriction = config.spinningFriction = 0.02;
+  config.contactTolerance = 1e-9;  // what is left of motion is in its proportion, and is not asked for here
   Space<double> space(config);
   space.setUniformField({0, 0, -9.81});
   space.addBox({-0.4, -0.4, 0}, {0.4, 0.4, 9}, defaultMaterial, BoxFaces::HighZ);
