@@ -5,6 +5,10 @@
 #include <gravel/contact/turning_lanes.hpp>
 #include <gravel/core/random.hpp>
 
+#include <array>
+#include <cmath>
+#include <vector>
+
 using namespace gravel;
 using namespace gravel::test;
 

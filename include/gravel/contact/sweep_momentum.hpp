@@ -14,7 +14,6 @@ template <Real S>
 class SweepMomentum {
  public:
   using Group = RowGroup<S>;
-  using Lanes = RowLanes<S>;
 
   /// Of the impulses of some rows.
   struct Step {

@@ -3,47 +3,10 @@
 /// \file
 /// The settings of a running space: getters, and setters that check.
 
-#include <gravel/core/check.hpp>
 #include <gravel/space/simulation_config.hpp>
-
-#include <stdexcept>
+#include <gravel/space/step_in_progress.hpp>
 
 namespace gravel {
-
-namespace detail {
-
-/// Whether a step of an object is on; a copy, which a hook may make, is not in it.
-class StepInProgress {
- public:
-  StepInProgress() = default;
-  StepInProgress(const StepInProgress& /*other*/) noexcept {}
-  StepInProgress& operator=(const StepInProgress& /*other*/) noexcept { return *this; }
-  ~StepInProgress() = default;
-
-  /// Until the end of a scope, however that is left.
-  class Scope {
-   public:
-    explicit Scope(StepInProgress& step) : on_(step.on_) { on_ = true; }
-    Scope(const Scope&) = delete;
-    Scope& operator=(const Scope&) = delete;
-    ~Scope() { on_ = false; }
-
-   private:
-    bool& on_;
-  };
-
-  /// \throws std::logic_error inside a step
-  void refuse(const char* call) const {
-    if (on_) {
-      throw std::logic_error(faultText(call, "called by a hook, inside a step", "between steps"));
-    }
-  }
-
- private:
-  bool on_ = false;
-};
-
-}  // namespace detail
 
 /// Base of `Space`: holds the configuration. Every setter throws std::invalid_argument that names the
 /// setting, the value and what is allowed, and then leaves the setting as it was; std::logic_error inside a
