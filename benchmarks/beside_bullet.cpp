@@ -7,6 +7,7 @@
 
 #include "boxes.hpp"
 #include "stopwatch.hpp"
+#include "support/space_of_float.hpp"
 
 #include <btBulletDynamicsCommon.h>
 #include <omp.h>

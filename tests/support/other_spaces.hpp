@@ -9,8 +9,9 @@
 #include <gravel/space/space.hpp>
 
 #ifndef GRAVEL_TEST_SLOW
+#include "support/space_of_float.hpp"
+
 namespace gravel {
-extern template class Space<float, SoA>;
 extern template class Space<long double, SoA>;
 extern template class Space<double, AoS>;
 extern template class Space<double, AoSoA<8>>;

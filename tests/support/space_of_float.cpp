@@ -1,3 +1,3 @@
-#include "support/other_spaces.hpp"
+#include "support/space_of_float.hpp"
 
 template class gravel::Space<float, gravel::SoA>;
