@@ -186,32 +186,32 @@ struct TwoCentres {
 // The Jacobian J of a symplectic step keeps J^T w J = w, w the symplectic form; here by central differences
 // in long double, in the plane about two centres.
 TEST_CASE("A symplectic step keeps the symplectic form, and what is declared not to be does not") {
-  using Real80 = long double;
-  using State = Eigen::Matrix<Real80, 4, 1>;  // x, y, vx, vy
-  const auto stepped = [](IntegratorKind kind, const State& s) -> State {
-    Bodies<Real80> bodies;
-    Body<Real80> body;
+  using Extended = long double;
+  using PhasePoint = Eigen::Matrix<Extended, 4, 1>;  // x, y, vx, vy
+  const auto stepped = [](IntegratorKind kind, const PhasePoint& s) -> PhasePoint {
+    Bodies<Extended> bodies;
+    Body<Extended> body;
     body.position = {s[0], s[1], 0};
     body.velocity = {s[2], s[3], 0};
     bodies.add(body);
     run(kind, bodies, 0.4L, 1, TwoCentres{});
-    const Body<Real80> b = bodies[0].load();
-    return State(b.position[0], b.position[1], b.velocity[0], b.velocity[1]);
+    const Body<Extended> b = bodies[0].load();
+    return PhasePoint(b.position[0], b.position[1], b.velocity[0], b.velocity[1]);
   };
   for (const IntegratorKind kind : kinds) {
-    const State start(1.0L, 0.3L, -0.2L, 0.9L);
-    Eigen::Matrix<Real80, 4, 4> jacobian;
-    const Real80 d = 1e-5L;
+    const PhasePoint start(1.0L, 0.3L, -0.2L, 0.9L);
+    Eigen::Matrix<Extended, 4, 4> jacobian;
+    const Extended d = 1e-5L;
     for (int k = 0; k < 4; ++k) {
-      const State e = State::Unit(k) * d;
+      const PhasePoint e = PhasePoint::Unit(k) * d;
       // Fourth order: the error is d^4 times the fifth derivative, which a step of 0.4 makes some 1e3.
       jacobian.col(k) = (8 * (stepped(kind, start + e) - stepped(kind, start - e)) -
                          (stepped(kind, start + 2 * e) - stepped(kind, start - 2 * e))) /
                         (12 * d);
     }
-    Eigen::Matrix<Real80, 4, 4> form;
+    Eigen::Matrix<Extended, 4, 4> form;
     form << 0, 0, 1, 0, 0, 0, 0, 1, -1, 0, 0, 0, 0, -1, 0, 0;
-    const Real80 error = (jacobian.transpose() * form * jacobian - form).norm();
+    const Extended error = (jacobian.transpose() * form * jacobian - form).norm();
     CAPTURE(traitsOf(kind).name, static_cast<double>(error));
     CHECK((error < 1e-11L) == traitsOf(kind).symplectic);
     CHECK(error < 1e-3L);
