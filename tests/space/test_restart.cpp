@@ -297,6 +297,61 @@ TEST_CASE("Damaged, cut, foreign and missing files are refused, and the space st
   CHECK(sameBits(stateOf(space), stateOf(twin)));
 }
 
+// Seen to fail: numbers, reals or materials taken up as they come, which makes the next steps throw; planes
+// in any order.
+TEST_CASE("Values that cannot be are refused by name where a file's checksum is right") {
+  const TemporaryFile file("values");
+  Space<double> saved(plain(5e-3));
+  saved.setUniformField({0, 0, -9.81});
+  saved.addPlane({0, 0, 1}, 0.0);
+  saved.addPlane({1, 0, 0}, -3.0);
+  saved.addBody(ball({0, 0, 0.5}, {0, 0, 0}, 0.5));
+  saved.addBody(ball({0, 0, 1.5}, {0, 0, 0}, 0.5));
+  advance(saved, 50);
+  saved.save(file.path());
+  const std::vector<char> good = file.bytes();
+  auto space = busy<double>();
+  advance(space, 3);
+  const auto before = stateOf(space);
+  // Writes `value` over the first one of that record.
+  const auto refuses = [&](const std::string& name, const auto& value, const std::string& why) {
+    CAPTURE(name, why);
+    std::vector<char> bytes = good;
+    const std::uint64_t length = name.size();
+    std::string head(reinterpret_cast<const char*>(&length), sizeof length);
+    const std::uint64_t width = sizeof value;
+    head.append(reinterpret_cast<const char*>(&width), sizeof width);
+    auto at = std::search(bytes.begin(), bytes.end(), head.begin(), head.end());
+    while (at != bytes.end() && !std::equal(name.begin(), name.end(), at + 24)) {
+      at = std::search(at + 1, bytes.end(), head.begin(), head.end());
+    }
+    REQUIRE(at != bytes.end());
+    REQUIRE(*(at + 16) > 0);  // values
+    std::memcpy(&*(at + 24) + length, &value, sizeof value);
+    const std::size_t end = bytes.size() - sizeof(std::uint64_t);
+    const std::uint64_t sum =
+        detail::fnv1a(detail::fnvStart, reinterpret_cast<const unsigned char*>(bytes.data()), end);
+    std::memcpy(bytes.data() + end, &sum, sizeof sum);
+    file.put(bytes);
+    CHECK_THROWS_WITH(space.restore(file.path()), ContainsSubstring(why));
+    CHECK(sameBits(stateOf(space), before));
+  };
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  refuses("dt", 0.0, "dt of a snapshot is 0; allowed: finite, > 0");
+  refuses("previous_dt", -1.0, "previous_dt of a snapshot is -1; allowed: finite, >= 0");
+  refuses("time", nan, "time of a snapshot is nan");
+  refuses("field.y", infinite, "field of a snapshot is inf");
+  refuses("step of gaps", -1.0, "step of impulses or gaps that is negative or not finite");
+  for (const char* name :
+       {"acceleration", "angularVelocity", "planes", "contacts", "impulses", "solved bodies"}) {
+    refuses(name, nan, std::string("a value of '") + name + "' that is not finite");
+  }
+  refuses("numbers of planes", std::uint64_t{77}, "planes that are not in the order of their numbers");
+  refuses("material", std::uint32_t{77}, "material of body 0 is 77; allowed: 0");
+  refuses("domain", std::uint32_t{77}, "a domain of an unknown kind");
+}
+
 TEST_CASE("The hook and the log stay those of the space that takes a file up") {
   const TemporaryFile file("hook");
   Space<double> space(plain(1e-3));

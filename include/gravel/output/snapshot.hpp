@@ -9,6 +9,7 @@
 
 #include <gravel/bodies/bodies.hpp>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstring>
 #include <stdexcept>
@@ -119,6 +120,16 @@ class SnapshotReader {
       return values;
     }
 
+  /// Real numbers of a state that steps go on from.
+  template <class T>
+  std::vector<T> finite(const std::string& name) {
+    std::vector<T> values = array<T>(name);
+    if (!std::all_of(values.begin(), values.end(), [](const T& x) { return isFinite(x); })) {
+      fail("holds a value of '" + name + "' that is not finite");
+    }
+    return values;
+  }
+
   template <class T>
   T value(const std::string& name) {
     const std::vector<T> values = array<T>(name);
@@ -187,9 +198,10 @@ Bodies<Scalar, SoA> loadBodies(SnapshotReader& in) {
   SoA::Storage<Scalar> fieldsOf;
   RealFields::forEach([&]<class F>(F field) {
     constexpr auto width = static_cast<std::size_t>(F::width);
-    const std::vector<Scalar> values = in.array<Scalar>(F::name);
+    const std::vector<Scalar> values = in.finite<Scalar>(F::name);
     if (values.size() != n * width) {
-      in.fail(std::string("has too few values of ") + F::name);
+      in.fail("has " + std::to_string(values.size()) + " values of '" + F::name + "' for " +
+              std::to_string(n) + " bodies");
     }
     fieldsOf.resize(n);
     for (std::size_t i = 0; i < n; ++i) {
@@ -206,7 +218,8 @@ Bodies<Scalar, SoA> loadBodies(SnapshotReader& in) {
   IntegerFields::forEach([&]<class F>(F field) {
     const auto values = in.array<typename F::Integer>(F::name);
     if (values.size() != n) {
-      in.fail(std::string("has too few values of ") + F::name);
+      in.fail("has " + std::to_string(values.size()) + " values of '" + F::name + "' for " +
+              std::to_string(n) + " bodies");
     }
     for (std::size_t i = 0; i < n; ++i) {
       fieldsOf.at(field, i) = values[i];

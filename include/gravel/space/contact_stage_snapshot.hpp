@@ -93,17 +93,17 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
   } else if (static_cast<DomainKind>(kind) == DomainKind::ShearPeriodic) {
     domain = Domain<Scalar>::shearPeriodic({lengths[0], lengths[1], lengths[2]}, omega, vertical);
   }
-  const std::vector<Scalar> sides = in.array<Scalar>("planes");
+  const std::vector<Scalar> sides = in.finite<Scalar>("planes");
   const auto surfaces = in.array<std::uint32_t>("materials of planes");
   const auto planeNumbers = in.array<std::uint64_t>("numbers of planes");
   auto surfacesOf = in.array<Material<Scalar>>("materials");
   const auto ofPairs = in.array<std::uint32_t>("pairs of materials");
   const auto pairMaterials = in.array<Material<Scalar>>("materials of pairs");
   const auto names = in.array<std::uint64_t>("names of contacts");
-  const std::vector<Scalar> places = in.array<Scalar>("contacts");
+  const std::vector<Scalar> places = in.finite<Scalar>("contacts");
   const auto pairs = in.array<Material<Scalar>>("materials of contacts");
   const auto keys = in.array<std::uint64_t>("keys of impulses");
-  const std::vector<Scalar> impulses = in.array<Scalar>("impulses");
+  const std::vector<Scalar> impulses = in.finite<Scalar>("impulses");
   if (sides.size() != 11 * surfaces.size() || planeNumbers.size() != surfaces.size() + 2 ||
       2 * impulses.size() != 7 * keys.size() || surfacesOf.empty() ||
       places.size() * 4 != names.size() * 10 || pairs.size() * 4 != names.size() ||
@@ -117,6 +117,9 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
   std::vector<Plane<Scalar>> planes;
   for (std::size_t p = 0; p < surfaces.size(); ++p) {
     materials.check(surfaces[p], "plane " + std::to_string(p));
+    if (p > 0 && planeNumbers[p] <= planeNumbers[p - 1]) {
+      in.fail("holds planes that are not in the order of their numbers");
+    }
     const Scalar* side = &sides[11 * p];
     planes.push_back({{side[0], side[1], side[2]},
                       side[3],
@@ -146,15 +149,19 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
     const Scalar* j = &impulses[7 * k];
     memory[k] = {keys[2 * k], keys[2 * k + 1], {j[0], {j[1], j[2], j[3]}, {j[4], j[5], j[6]}}};
   }
-  solver_.setMemory(std::move(memory), in.value<Scalar>("step of impulses"));
+  const auto step = in.value<Scalar>("step of impulses");
   gapStep_ = in.value<Scalar>("step of gaps");
-  const std::vector<Scalar> to = in.array<Scalar>("solved to");
-  const std::vector<Scalar> moved = in.array<Scalar>("solved bodies");
-  const std::vector<Scalar> looked = in.array<Scalar>("solved contacts");
+  const std::vector<Scalar> to = in.finite<Scalar>("solved to");
+  const std::vector<Scalar> moved = in.finite<Scalar>("solved bodies");
+  const std::vector<Scalar> looked = in.finite<Scalar>("solved contacts");
   if (to.size() != 2 || moved.size() % 13 != 0 || looked.size() % 4 != 0 ||
       (!looked.empty() && looked.size() / 4 != contacts_.size())) {
     in.fail("holds a part of a solved body or contact");
   }
+  if (!isFinite(step) || step < Scalar(0) || !isFinite(gapStep_) || gapStep_ < Scalar(0)) {
+    in.fail("holds a step of impulses or gaps that is negative or not finite");
+  }
+  solver_.setMemory(std::move(memory), step);
   resumed_ = {{}, {}, to[0], to[1]};
   for (std::size_t k = 0; k < moved.size(); k += 13) {
     const auto at = [&](std::size_t c) {

@@ -101,11 +101,11 @@ class OrbitStage {
 
   /// Of the bodies of the same file. \throws std::runtime_error if the file does not hold what save() writes
   void load(const gravel::Bodies<Scalar, SoA>& bodies, SnapshotReader& in) {
-    if (!gaussRadau_.setState(in.array<Scalar>("Gauss-Radau"))) {
+    if (!gaussRadau_.setState(in.finite<Scalar>("Gauss-Radau"))) {
       in.fail("holds a Gauss-Radau state of a wrong length");
     }
-    wisdomHolman_.lost().setLostParts(bodies, in.array<Scalar>("Wisdom-Holman"));
-    if (!hermite_.setState(bodies, in.array<Scalar>("Hermite"))) {
+    wisdomHolman_.lost().setLostParts(bodies, in.finite<Scalar>("Wisdom-Holman"));
+    if (!hermite_.setState(bodies, in.finite<Scalar>("Hermite"))) {
       in.fail("holds a Hermite state of a wrong length");
     }
   }

@@ -203,7 +203,7 @@ class SleepStage {
     while (!record.done()) {
       islands_.push_back(record.island());
     }
-    slow_ = in.array<Scalar>("time slow");
+    slow_ = in.finite<Scalar>("time slow");
     ids_ = in.array<std::uint64_t>("ids of the slow");
     surface_ = in.value<Material<Scalar>>("surface of sleepers");
     if (ids_.size() != slow_.size()) {

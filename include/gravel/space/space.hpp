@@ -212,7 +212,7 @@ class Space : public Settings<Scalar> {
   /// \throws std::runtime_error if the file cannot be written
   void save(const std::string& path) const;
   /// Takes up a saved run: the next steps give the bits that the saved space would have given. Hooks and
-  /// the log stay those of this space. \throws std::runtime_error, and this space stays as it was
+  /// the log stay those of this space. \throws std::runtime_error, std::invalid_argument: it stays as it was
   void restore(const std::string& path);
 
   // Parts of the collision handling, as the step uses them.

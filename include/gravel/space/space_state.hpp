@@ -182,6 +182,22 @@ struct SpaceNumbers {
     visit("ledgerOpen", ledgerOpen);
     visit("stale", stale);
   }
+
+  /// \throws std::invalid_argument for what no space can have
+  void validate() const {
+    const auto require = [](bool good, const char* what, const Scalar& value, const char* allowed) {
+      if (!good) {
+        refuse(std::string(what) + " of a snapshot", formatReal(value), allowed);
+      }
+    };
+    require(isFinite(dt) && dt > Scalar(0), "dt", dt, "finite, > 0");
+    require(isFinite(previous_dt) && !(previous_dt < Scalar(0)), "previous_dt", previous_dt, "finite, >= 0");
+    require(isFinite(time), "time", time, "finite");
+    require(isFinite(timeRest), "timeRest", timeRest, "finite");
+    for (int axis = 0; axis < 3; ++axis) {
+      require(isFinite(field[axis]), "field", field[axis], "finite");
+    }
+  }
 };
 
 }  // namespace detail
@@ -233,14 +249,16 @@ void Space<Scalar, Layout>::restore(const std::string& path) {
   config.validate();
   detail::SpaceNumbers<Scalar> numbers{};
   numbers.forEach([&]<class T>(const char* name, T& value) { value = in.value<T>(name); });
+  numbers.validate();
   ContactStage<Scalar, Layout> contact;
   contact.load(in);
   SleepStage<Scalar, Layout> sleep;
   sleep.load(in);
   gravel::Bodies<Scalar, SoA> bodies = loadBodies<Scalar>(in);
+  contact.materials.check(bodies);
   bodies.skipIds(BodyId{numbers.nextId});
-  const std::vector<Scalar> lost = in.array<Scalar>("lost parts");
-  const std::vector<Scalar> ofHook = in.array<Scalar>("forces of the hook");
+  const std::vector<Scalar> lost = in.finite<Scalar>("lost parts");
+  const std::vector<Scalar> ofHook = in.finite<Scalar>("forces of the hook");
   if (!ofHook.empty() && ofHook.size() != 3 * bodies.size()) {
     in.fail("holds lists of different lengths");
   }
