@@ -297,6 +297,25 @@ TEST_CASE("Damaged, cut, foreign and missing files are refused, and the space st
   CHECK(sameBits(stateOf(space), stateOf(twin)));
 }
 
+namespace {
+
+/// Where the values of a record of SnapshotWriter begin, and how many there are.
+std::pair<std::size_t, std::size_t> findRecord(const std::vector<char>& bytes, const std::string& name) {
+  std::size_t at = sizeof detail::snapshotMagic - 1;
+  std::uint64_t head[3] = {};  // length of the name, size of a value, number of values
+  while (at + sizeof head < bytes.size()) {
+    std::memcpy(head, bytes.data() + at, sizeof head);
+    at += sizeof head + head[0];
+    if (name == std::string(bytes.data() + at - head[0], head[0])) {
+      return {at, head[2]};
+    }
+    at += head[1] * head[2];
+  }
+  return {at, 0};
+}
+
+}  // namespace
+
 // Seen to fail: numbers, reals or materials taken up as they come, which makes the next steps throw; planes
 // in any order.
 TEST_CASE("Values that cannot be are refused by name where a file's checksum is right") {
@@ -317,17 +336,9 @@ TEST_CASE("Values that cannot be are refused by name where a file's checksum is 
   const auto refuses = [&](const std::string& name, const auto& value, const std::string& why) {
     CAPTURE(name, why);
     std::vector<char> bytes = good;
-    const std::uint64_t length = name.size();
-    std::string head(reinterpret_cast<const char*>(&length), sizeof length);
-    const std::uint64_t width = sizeof value;
-    head.append(reinterpret_cast<const char*>(&width), sizeof width);
-    auto at = std::search(bytes.begin(), bytes.end(), head.begin(), head.end());
-    while (at != bytes.end() && !std::equal(name.begin(), name.end(), at + 24)) {
-      at = std::search(at + 1, bytes.end(), head.begin(), head.end());
-    }
-    REQUIRE(at != bytes.end());
-    REQUIRE(*(at + 16) > 0);  // values
-    std::memcpy(&*(at + 24) + length, &value, sizeof value);
+    const auto [first, count] = findRecord(bytes, name);
+    REQUIRE(count > 0);
+    std::memcpy(bytes.data() + first, &value, sizeof value);
     const std::size_t end = bytes.size() - sizeof(std::uint64_t);
     const std::uint64_t sum =
         detail::fnv1a(detail::fnvStart, reinterpret_cast<const unsigned char*>(bytes.data()), end);
