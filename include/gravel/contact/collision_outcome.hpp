@@ -130,9 +130,12 @@ Scalar cubeRoot(const Scalar& x) {
 /// \param a,b movable bodies with mass, or a fixed one as `a`
 /// \param r_ab [m] from a to b, as the nearest image stands
 /// \param v_ab [m s^-1] velocity of that image of b relative to a
+/// \param turn [rad s^-1] of the frame that velocities and spins are those in. Angular momentum is kept where
+///        nothing turns: two at rest in the frame become a smaller body, which turns faster than it.
 template <Real Scalar>
 Body<Scalar> merged(const Body<Scalar>& a, const Body<Scalar>& b, const Vector3<Scalar>& r_ab,
-                    const Vector3<Scalar>& v_ab) {
+                    const Vector3<Scalar>& v_ab,
+                    const Vector3<Scalar>& turn = Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(0))) {
   const MassShares<Scalar> share = massShares<Scalar>(a.mass, true, b.mass, true);  // by inverse mass
   const auto inertiaOf = [](const Body<Scalar>& body) {
     return Scalar(detail::inertiaFactor(body) * body.mass * body.radius * body.radius);
@@ -157,9 +160,11 @@ Body<Scalar> merged(const Body<Scalar>& a, const Body<Scalar>& b, const Vector3<
   // a's share of the motion of b: m_b / (m_a + m_b) is a's share by inverse mass.
   one.position = a.position + share.first * r_ab;
   one.velocity = a.velocity + share.first * v_ab;
-  const Vector3<Scalar> angular = inertiaOf(a) * a.angularVelocity + inertiaOf(b) * b.angularVelocity +
-                                  share.effective * r_ab.cross(v_ab);
-  one.angularVelocity = inertia > Scalar(0) ? Vector3<Scalar>(angular / inertia) : a.angularVelocity;
+  const Vector3<Scalar> spins = inertiaOf(a) * Vector3<Scalar>(a.angularVelocity + turn) +
+                                inertiaOf(b) * Vector3<Scalar>(b.angularVelocity + turn);
+  const Vector3<Scalar> angular =
+      spins + share.effective * r_ab.cross(Vector3<Scalar>(v_ab + turn.cross(r_ab)));
+  one.angularVelocity = inertia > Scalar(0) ? Vector3<Scalar>(angular / inertia - turn) : a.angularVelocity;
   return one;
 }
 

@@ -121,7 +121,7 @@ void Space<Scalar, Layout>::merge(BodyId stays, BodyId goes, const Scalar& time)
   const Scalar motion = bodies_[i].kineticEnergy() + bodies_[j].kineticEnergy() + sped;
   const Scalar energy = bindingEnergy(i, time) + bindingEnergy(j, time) - pairEnergy(i, j, time);
   const Vector pull = Vector(bodies_[i].force()) + Vector(bodies_[j].force());
-  const Body<Scalar> one = merged(a, b, r_ab, v_ab);
+  const Body<Scalar> one = merged(a, b, r_ab, v_ab, Vector(Scalar(0), Scalar(0), frame.omega));
   bodies_[i].store(one);
   if (!one.fixed) {
     bodies_[i].force() = pull;
