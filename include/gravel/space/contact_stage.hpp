@@ -267,7 +267,7 @@ class ContactStage {
 
   template <class Travel>
   void search(const Bodies& bodies, const Config& config, const Scalar& time, const Travel& travel,
-              Profiler& profiler);
+              const Scalar& h, Profiler& profiler);
 
   void prepareSurfaces(const Config& config, const PartOfStep<Scalar>& part = {});
 

@@ -24,7 +24,7 @@ bool ContactStage<Scalar, Layout>::foresees(const Bodies& bodies, const Config& 
         return detail::isMovable(bodies, i) ? Vector3<Scalar>(course.velocity(bodies, i) * h)
                                             : Vector3<Scalar>(Vector3<Scalar>::Zero());
       },
-      profiler);
+      h, profiler);
   const Profiler::Scope scope(profiler, Phase::Impacts);
   prepareSurfaces(config);
   return impacts_.foresees(bodies, neighbours_.pairs(), domain, walls_, {time, h}, nearBoundaries(bodies, h),
@@ -59,7 +59,7 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
     return detail::isMovable(bodies, i) ? Vector3<Scalar>(course.velocity(bodies, i) * h)
                                         : Vector3<Scalar>(Vector3<Scalar>::Zero());
   };
-  search(bodies, config, time, way, profiler);
+  search(bodies, config, time, way, h, profiler);
   searched_ = true;
   const Profiler::Scope scope(profiler, Phase::Impacts);
   prepareSurfaces(config, part);

@@ -41,7 +41,7 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
     return;
   }
   if (!searched || !goesOn) {
-    search(bodies, config, time, AtRest{}, profiler);
+    search(bodies, config, time, AtRest{}, Scalar(0), profiler);
   }
   prepareSurfaces(config);
   gapStep_ = goesOn ? detail::nextGapStep(gapStep_, h) : std::max<Scalar>(gapStep_, h);
@@ -118,11 +118,11 @@ void ContactStage<Scalar, Layout>::renewGeometry(const Bodies& bodies, const Con
 template <Real Scalar, class Layout>
 template <class Travel>
 void ContactStage<Scalar, Layout>::search(const Bodies& bodies, const Config& config, const Scalar& time,
-                                          const Travel& travel, Profiler& profiler) {
+                                          const Travel& travel, const Scalar& h, Profiler& profiler) {
   const Profiler::Scope scope(profiler, Phase::NeighbourSearch);
   neighbours_.setKind(config.broadPhase);
   neighbours_.update(bodies.positions(), detail::RestingReaches<Bodies>{bodies}, bodies.ids(),
-                     bodies.revision(), domain, time, Scalar(0), travel);
+                     bodies.revision(), domain, time, Scalar(0), travel, h);
 }
 
 template <Real Scalar, class Layout>

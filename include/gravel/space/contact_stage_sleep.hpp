@@ -35,7 +35,7 @@ void ContactStage<Scalar, Layout>::forEachApproach(const Bodies& bodies, const C
     }
     return w;
   };
-  search(bodies, config, time, way, profiler);
+  search(bodies, config, time, way, h, profiler);
   for (const Pair& pair : neighbours_.pairs()) {
     const bool firstMoves = detail::isMovable(bodies, pair.first);
     if (firstMoves == detail::isMovable(bodies, pair.second)) {

@@ -69,10 +69,19 @@ Vector3<S> commonWay(std::size_t n, Way&& way) {
   return S(4) * rest_sq < whole_sq ? common : Vector3<S>(Vector3<S>::Zero());
 }
 
-/// The frame that moves with what all bodies have in common, from the last search to the end of their ways.
+/// The frame that moves with what all bodies have in common, from the last search to the end of their ways;
+/// in a shear-periodic box with the flow, in which all images of a body have the same way.
 template <Real S>
 class CommonMotion {
  public:
+  /// \param ahead [1] by which the flow will shear during the ways: a body at x goes -ahead x in y with it
+  void shear(const S& ahead) { ahead_ = ahead; }
+  const S& ahead() const { return ahead_; }
+  /// [1] Its size.
+  S shearing() const { return ahead_ < S(0) ? S(-ahead_) : ahead_; }
+  /// [1] What ways use of a skin, with the shear of what they cross meanwhile, over their length.
+  S spread() const { return S(1) + S(2) * shearing(); }
+
   /// \param start, end [m] since the last search, before and after the ways
   void set(const Vector3<S>& start, const Vector3<S>& end) {
     start_ = start;
@@ -88,14 +97,22 @@ class CommonMotion {
   const S& most() const { return most_; }
   bool isNone() const { return !(most_ > S(0)); }
 
-  /// `travel` as seen in this frame.
-  template <class Travel>
-  auto lessThis(const Travel& travel) const {
+  /// A way from x as seen in this frame.
+  Vector3<S> lessThis(const Vector3<S>& x, const Vector3<S>& way) const {
+    Vector3<S> rest = way - (end_ - start_);
+    if (!(ahead_ == S(0))) {
+      rest[1] += ahead_ * x[0];
+    }
+    return rest;
+  }
+  /// `travel` from these positions as seen in it.
+  template <class Positions, class Travel>
+  auto lessThis(const Positions& positions, const Travel& travel) const {
     if constexpr (std::is_same_v<Travel, AtRest>) {
       return travel;
     } else {
-      return [&travel, u = Vector3<S>(end_ - start_)](std::size_t i) -> Vector3<S> {
-        return Vector3<S>(travel(i)) - u;
+      return [this, &positions, &travel](std::size_t i) -> Vector3<S> {
+        return lessThis(Vector3<S>(positions[i]), Vector3<S>(travel(i)));
       };
     }
   }
@@ -104,6 +121,7 @@ class CommonMotion {
   Vector3<S> start_ = Vector3<S>::Zero();
   Vector3<S> end_ = Vector3<S>::Zero();
   S most_ = S(0);
+  S ahead_ = S(0);
 };
 
 }  // namespace detail

@@ -13,8 +13,8 @@ namespace gravel {
 /// Keeps the pairs of one search for as long as they are certain to hold every pair within reach. They are
 /// always a superset of what a fresh search would give, so that the skin has no say in any result.
 ///
-/// In a shear-periodic box displacements are measured against the flow -(3/2) Omega x, in whose frame the
-/// images stand still, and what the flow itself can bring a touching pair nearer is taken off the skin.
+/// In a shear-periodic box ways are measured against the flow -(3/2) Omega x, in whose frame the images stand
+/// still, and what the flow itself can bring a touching pair nearer is taken off the skin.
 ///
 /// A list can be asked to hold for a whole step, along straight ways whose ends are known. A few bodies that
 /// leave their half of the skin, bullets among grains, do not spoil it: each of them is compared with all
@@ -28,11 +28,14 @@ class NeighbourList {
   /// \param margin [m] >= 0
   /// \throws std::invalid_argument for positions or radii that are not finite, negative radii or margin
   /// \param travel  `travel(i)`: way [m] of body i while the list is to hold; `AtRest` for none
+  /// \param h [s] that these ways take, for a sheared domain
   template <class Positions, class Radii, class Ids, class Travel = AtRest>
   const std::vector<Pair>& update(const Positions& positions, const Radii& radii, const Ids& ids,
                                   std::uint64_t revision, const Domain<S>& domain, const S& time,
-                                  const S& margin = S(0), const Travel& travel = {}) {
+                                  const S& margin = S(0), const Travel& travel = {}, const S& h = S(0)) {
     detail::require("margin of a neighbour list", margin, detail::nonNegative<S>());
+    now_ = time;
+    common_.shear(S(S(1.5) * domain.omega() * h));
     ++updates_;
     version_ += extra_.empty() ? 0U : 1U;
     extra_.clear();
@@ -44,11 +47,11 @@ class NeighbourList {
     }
     comparisons_ += swift_.size();
     swiftPairs_.resize(std::max(swiftPairs_.size(), swift_.size()));
-    const auto rest = common_.lessThis(travel);
+    const auto rest = common_.lessThis(positions, travel);
     parallelForTasks(swift_.size(), [&](std::size_t k) {
       swiftPairs_[k].clear();
       detail::compare(swift_[k], positions, radii, ids, detail::wayOf<S>(rest, swift_[k]), rest,
-                      S(room_ - skin_), free_, domain_, time_, swiftPairs_[k]);
+                      common_.ahead(), S(room_ - skin_), free_, domain_, now_, swiftPairs_[k]);
     });
     for (std::size_t k = 0; k < swift_.size(); ++k) {
       extra_.insert(extra_.end(), swiftPairs_[k].begin(), swiftPairs_[k].end());
@@ -65,13 +68,12 @@ class NeighbourList {
   template <class Positions, class Radii, class Ids, class Travel>
   void follow(std::uint32_t i, const Positions& positions, const Radii& radii, const Ids& ids,
               const Vector3<S>& way, const Travel& travel, std::vector<Pair>& out) {
-    const Vector3<S> x = positions[i];
-    if (!(std::max<S>(wayFrom_sq(i, x, common_.start()), wayFrom_sq(i, x + way, common_.end())) <=
-          half_sq_)) {
+    if (!(farthest_sq(i, positions[i], way) <= half_sq_)) {
       ++comparisons_;
       strays_ = true;
-      detail::compare(i, positions, radii, ids, Vector3<S>(way - (common_.end() - common_.start())),
-                      common_.lessThis(travel), S(room_ - skin_), free_, domain_, time_, out);
+      detail::compare(i, positions, radii, ids, common_.lessThis(Vector3<S>(positions[i]), way),
+                      common_.lessThis(positions, travel), common_.ahead(), S(room_ - skin_), free_, domain_,
+                      now_, out);
     }
   }
 
@@ -137,8 +139,8 @@ class NeighbourList {
       return "the domain changed";
     }
     flow_ = S(1.5) * domain.omega() * (time - time_);
-    const S drift = flow_ < S(0) ? S(-flow_) : flow_;
-    free_ = room_ - margin - drift * (S(2) * largest_ + margin);
+    const S drift = (flow_ < S(0) ? S(-flow_) : flow_) + common_.shearing();
+    free_ = (room_ - margin - drift * (S(2) * largest_ + margin)) / common_.spread();
     if (free_ < S(0)) {
       return margin > S(0) ? "the margin grew or the flow used up the skin" : "the flow used up the skin";
     }
@@ -163,14 +165,7 @@ class NeighbourList {
     parts_.resize((n + chunk - 1) / chunk);
     parallelForChunks<Share::Alike>(n, chunk, [&](std::size_t begin, std::size_t end) {
       const auto farthest = [&](std::size_t i) __attribute__((always_inline)) {
-        const Vector3<S> x = positions[i];
-        const S d_sq = wayFrom_sq(i, x, common_.start());
-        if constexpr (std::is_same_v<Travel, AtRest>) {
-          return d_sq;
-        } else {
-          const S end_sq = wayFrom_sq(i, x + Vector3<S>(travel(i)), common_.end());
-          return end_sq > d_sq || !(end_sq == end_sq) ? end_sq : d_sq;
-        }
+        return farthest_sq(i, positions[i], detail::wayOf<S>(travel, i));
       };
       const auto same = [&](std::size_t i) { return radii[i] == radii_[i]; };
       parts_[begin / chunk].look(begin, end, half_sq_, farthest, same);
@@ -197,20 +192,25 @@ class NeighbourList {
     return tooFar;
   }
 
-  /// Of body i at x from where the last search saw it, less what all have in common.
-  [[gnu::always_inline]] S wayFrom_sq(std::size_t i, const Vector3<S>& x, const Vector3<S>& common) const {
-    Vector3<S> d = x - places_[i];
+  /// From where the last search saw body i to where it is on this way from x, less what all have in common.
+  [[gnu::always_inline]] S farthest_sq(std::size_t i, const Vector3<S>& x, const Vector3<S>& way) const {
+    Vector3<S> start = x - places_[i];
+    Vector3<S> end;
     if (domain_.isOpen()) {
-      d -= common;
+      end = Vector3<S>(x + way) - places_[i] - common_.end();
+      start -= common_.start();
     } else {
-      d[1] += flow_ * x[0];
-      d = domain_.minimumImage(d, time_);
+      start[1] += flow_ * x[0];
+      start = domain_.minimumImage(start, time_);
+      end = start + common_.lessThis(x, way);
+      end[1] += flow_ * way[0];
     }
-    return d.squaredNorm();
+    const S d_sq = start.squaredNorm();
+    const S end_sq = end.squaredNorm();
+    return end_sq > d_sq || !(end_sq == end_sq) ? end_sq : d_sq;
   }
 
-  /// How far a body may get, less what subtraction loses: a few units in the last place of what is
-  /// subtracted.
+  /// How far a body may get, less what subtraction loses: a few units in its last place.
   void setHalf() {
     const S half = free_ / S(2) - S(16) * detail::roundoff<S>() * common_.most();
     half_sq_ = half > S(0) ? S(half * half) : S(0);
@@ -258,12 +258,13 @@ class NeighbourList {
       if (domain.isOpen()) {
         common_.set(Vector3<S>::Zero(), detail::commonWay<S>(n, travel));
       }
-      skin_ = std::max<S>(skin_, detail::takeSwift(n, mostSwift(n), skin_, common_.lessThis(travel), swift_));
+      skin_ = std::max<S>(
+          skin_, detail::takeSwift(n, mostSwift(n), skin_, common_.lessThis(positions, travel), swift_));
     }
     free_ = skin_;
     setHalf();
     comparisons_ = 0;
-    room_ = margin + skin_;
+    room_ = margin + skin_ * common_.spread() + common_.shearing() * (S(2) * largest_ + margin);
     // Distances at both times and the displacement are rounded: a few units of what is subtracted.
     S scale = S(2) * largest_ + room_ + common_.most();
     if (!domain.isOpen()) {
@@ -296,6 +297,7 @@ class NeighbourList {
   std::size_t comparisons_ = 0;                ///< of one body with all others since the last search
   Domain<S> domain_;
   S time_ = S(0);
+  S now_ = S(0);  ///< of the last update
   S largest_ = S(0);
   S skin_ = S(0);
   S room_ = S(0);     ///< margin and skin of the last search

@@ -76,18 +76,20 @@ S skinFor(const S& radius, const S& perUpdate) {
 }
 
 /// Appends the pairs of body i on its way, with others on theirs. O(N).
-/// \param way [m] from positions[i]
+/// \param own [m] its way from positions[i]
 /// \param travel `travel(j)`: way [m] of body j; `AtRest` for none
+/// \param ahead [1] of CommonMotion, less whose frame these ways are
 /// \param slack [m] added to the sum of the radii
 /// \param free [m] what is left of the skin
 template <Real S, class Positions, class Radii, class Ids, class Travel>
 void compare(std::uint32_t i, const Positions& positions, const Radii& radii, const Ids& ids,
-             const Vector3<S>& way, const Travel& travel, const S& slack, const S& free,
+             const Vector3<S>& own, const Travel& travel, const S& ahead, const S& slack, const S& free,
              const Domain<S>& domain, const S& time, std::vector<Pair>& out) {
   const Vector3<S> x = positions[i];
-  const S length_sq = way.squaredNorm();
+  Vector3<S> way = own;
+  S length_sq = way.squaredNorm();
   using std::sqrt;
-  const S widest = slack + free + S(sqrt(length_sq));
+  S widest = slack + free + S(sqrt(length_sq));
   const S rounded = S(1) + S(16) * roundoff<S>();
   const S r_i = radii[i];
   const std::uint64_t id = idKey(ids[i]);
@@ -97,6 +99,11 @@ void compare(std::uint32_t i, const Positions& positions, const Radii& radii, co
       continue;
     }
     const Vector3<S> r = domain.minimumImage(Vector3<S>(positions[j]) - x, time);
+    if (!(ahead == S(0))) {  // as seen from the flow where j is
+      way[1] = own[1] + ahead * r[0];
+      length_sq = way.squaredNorm();
+      widest = slack + free + S(sqrt(length_sq));
+    }
     const S way_sq = wayOf<S>(travel, j).squaredNorm();
     // Most are too far for any of what follows: (a + b)^2 <= 2 (a^2 + b^2).
     const S near = radii_ij + widest;
