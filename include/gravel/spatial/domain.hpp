@@ -41,9 +41,9 @@ inline S nearestInteger(const S& x) {
 /// the unperturbed flow is v_y = -(3/2) Omega x, so the image one box further out in x lags by the sheared
 /// offset (3/2) Omega Lx t in y and by (3/2) Omega Lx in v_y (Wisdom & Tremaine 1988, AJ 95, 925). In z it is
 /// a box as well: what leaves at the top comes in at the bottom, in the first step where it was put outside.
-/// Only gravity and the vertical field know no images in z, so let the box be higher than bodies get. Bodies
-/// must be smaller than half a box, and go less than half of it in a step: of each pair only the image that
-/// is nearest where a step begins is looked at.
+/// Only gravity and the vertical field know no images in z, so let the box be higher than bodies get. The
+/// radii of two that touch must add up to at most half an edge, and bodies go less than half a box in a step:
+/// of each pair only the image that is nearest where a step begins is looked at.
 template <Real S>
 class Domain {
  public:
