@@ -100,7 +100,9 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       const bool ends = !(change > enough);
       const bool last = report.iterations >= settings.maxIterations;
       const bool half = report.iterations == settings.maxIterations - settings.maxIterations / 2;
-      const bool more = !last && (ends || half) && problem.letSlide(colouring, S(4) * change);
+      // A slip that goes back by a share of itself a sweep is some changes long, and will be none.
+      const S lasts = S(ends ? 32 : 4) * change;
+      const bool more = !last && (ends || half) && problem.letSlide(colouring, lasts);
       if (last || (ends && !more)) {
         problem.watch.setHolds(watched && ends);
         return report;
