@@ -179,8 +179,8 @@ class ContactStage {
     }
   }
 
-  /// The bodies stand in a new order, and contacts and impacts know theirs by id; those of the gone stay.
-  void renumber(const Bodies& bodies);
+  /// Bodies are in a new order; contacts and impacts know theirs by id. \return whether all of them are there
+  bool renumber(const Bodies& bodies);
 
   /// Why nothing can touch, or nullptr.
   const char* reasonToSkip(const Bodies& bodies) const;

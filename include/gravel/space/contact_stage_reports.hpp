@@ -134,7 +134,7 @@ bool ContactStage<Scalar, Layout>::renumber(const Bodies& bodies, Pair& pair) {
 }
 
 template <Real Scalar, class Layout>
-void ContactStage<Scalar, Layout>::renumber(const Bodies& bodies) {
+bool ContactStage<Scalar, Layout>::renumber(const Bodies& bodies) {
   bool complete = true;
   for (Contact<Scalar>& c : contacts_) {
     complete = renumber(bodies, c) && complete;
@@ -149,6 +149,7 @@ void ContactStage<Scalar, Layout>::renumber(const Bodies& bodies) {
   }
   known_ = false;  // indices are others
   moved_ = false;
+  return complete;
 }
 
 template <Real Scalar, class Layout>

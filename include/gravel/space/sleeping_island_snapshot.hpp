@@ -75,7 +75,7 @@ class IslandReader {
   explicit IslandReader(SnapshotReader& in)
       : in_(in),
         names_(in.array<std::uint64_t>("names of sleepers")),
-        numbers_(in.array<Scalar>("sleepers")),
+        numbers_(in.finite<Scalar>("sleepers")),
         materials_(in.array<Material<Scalar>>("materials of sleepers")) {}
 
   bool done() const { return name_ == names_.size(); }

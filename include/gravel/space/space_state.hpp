@@ -287,9 +287,9 @@ void Space<Scalar, Layout>::restore(const std::string& path) {
   left_ = numbers.left;
   steps_ = static_cast<std::size_t>(numbers.steps);
   ledgerOpen_ = numbers.ledgerOpen != 0;
-  contact_.renumber(bodies_);
+  const bool complete = contact_.renumber(bodies_);
   rememberPlaces();
-  forcesValid_ = numbers.stale == 0;
+  forcesValid_ = numbers.stale == 0 && complete;  // else contacts are found anew
 }
 
 }  // namespace gravel
