@@ -2,6 +2,8 @@
 
 #include "scenes.hpp"
 #include "support/catch.hpp"
+#include "support/threads.hpp"
+#include <gravel/contact/coloured_rows.hpp>
 #include <gravel/contact/graph_coloring.hpp>
 
 #include <omp.h>
@@ -71,7 +73,8 @@ Graph randomGraph(std::size_t n, double degree, std::uint64_t seed, bool bothWay
 /// has gone by at any time, but for a part of each.
 // Seen to fail: parts in the order of the colours.
 void checkParts(const ContactColoring& coloring) {
-  std::vector<std::pair<std::size_t, std::size_t>> groups{{0, coloring.loneCount()}};
+  std::vector<std::pair<std::size_t, std::size_t>> groups{{0, coloring.loneCount()},
+                                                          {coloring.loneCount(), coloring.begin(0)}};
   for (std::size_t colour = 0; colour <= coloring.colours(); ++colour) {
     groups.emplace_back(coloring.begin(colour), coloring.end(colour));
   }
@@ -321,6 +324,103 @@ TEST_CASE("colours, and the order within one, are those of one walk along a list
     CHECK(std::is_sorted(coloring.bodies().begin(), coloring.bodies().end()));
   }
   omp_set_num_threads(before);
+}
+
+// Seen to fail: all contacts whose first bodies are of a block among those within it; parts that stand where
+// they do in a colour of their block.
+TEST_CASE(
+    "of many bodies, contacts within blocks come first: of the same colours, and no two blocks share a "
+    "body") {
+  constexpr std::uint32_t side = 36;
+  constexpr std::uint32_t n = side * side * side;
+  Bodies<double, SoA> bodies;
+  for (std::uint32_t i = 0; i < n; ++i) {
+    Body<double> body;
+    body.radius = 1;
+    body.fixed = i % 97 == 3;
+    bodies.add(body);
+  }
+  std::set<std::pair<std::uint32_t, std::uint32_t>> pairs;
+  for (std::uint32_t i = 0; i < n - 2000; ++i) {  // neighbours in a lattice
+    for (const std::uint32_t ahead : {1U, side, side * side}) {
+      if (i + ahead < n - 2000) {
+        pairs.insert({i, i + ahead});
+      }
+    }
+  }
+  const CounterRandom random(6);
+  for (std::uint64_t k = 0; k < 4000; ++k) {  // and some far from each other
+    const auto i = static_cast<std::uint32_t>(random.uniform(2 * k, 0, n - 2000));
+    const auto j = static_cast<std::uint32_t>(random.uniform(2 * k + 1, 0, n - 2000));
+    if (i != j) {
+      pairs.insert(std::minmax(i, j));
+    }
+  }
+  for (std::uint32_t i = n - 1500; i + 1 < n; i += 2) {  // lone ones
+    pairs.insert({i, i + 1});
+  }
+  std::vector<Contact<double>> contacts;
+  for (const auto& [i, j] : pairs) {
+    contacts.push_back({i, j, i, j, {1, 0, 0}, -1.0, 1.0, 1.0});
+    if (i < n - 2000 && i % side == 0 && j == i + 1) {
+      contacts.push_back({i, staticPartner, i, boundaryKey(0), {-1, 0, 0}, -1.0, 1.0, 0.0});
+    }
+  }
+  std::sort(contacts.begin(), contacts.end(), byKeys);
+
+  const auto coloured = [&](int threads) {
+    const WithThreads some(threads);
+    ContactColoring coloring;
+    coloring.build(std::span<const Contact<double>>(contacts), bodies);
+    return coloring;
+  };
+  const ContactColoring coloring = coloured(1);
+  REQUIRE(coloring.blocks() > 8);
+  std::vector<int> seen(contacts.size(), 0);
+  std::vector<std::size_t> blockOf(n, coloring.blocks());
+  std::size_t place = 0;
+  const auto check = [&](std::size_t begin, std::size_t end, std::size_t block) {
+    std::set<std::uint32_t> taken;
+    bool fine = begin == place;  // groups follow each other
+    place = end;
+    for (std::size_t k = begin; k < end; ++k) {
+      const std::uint32_t contact = coloring.rows()[k].contact;
+      ++seen[contact];
+      fine = fine && (k == begin || coloring.rows()[k - 1].contact < contact);
+      for (const std::uint32_t body : {contacts[contact].first, contacts[contact].second}) {
+        if (body != staticPartner && !bodies[body].isFixed()) {
+          fine = fine && taken.insert(body).second;
+          if (block < coloring.blocks()) {
+            fine = fine && (blockOf[body] == coloring.blocks() || blockOf[body] == block);
+            blockOf[body] = block;
+          }
+        }
+      }
+    }
+    return fine;
+  };
+  bool fine = check(0, coloring.loneCount(), coloring.blocks());
+  CHECK(coloring.loneCount() >= 750);
+  for (std::size_t block = 0; block < coloring.blocks(); ++block) {
+    for (const ContactColoring::Part& rows : coloring.coloursOf(block)) {
+      fine = fine && rows.begin < rows.end && check(rows.begin, rows.end, block);
+    }
+  }
+  CHECK(fine);
+  CHECK(place == coloring.begin(0));
+  CHECK(place > contacts.size() / 2);  // most of them
+  for (std::size_t colour = 0; colour < coloring.colours(); ++colour) {
+    CHECK(check(coloring.begin(colour), coloring.end(colour), coloring.blocks()));
+  }
+  CHECK(coloring.begin(coloring.colours()) == contacts.size());  // no overflow here
+  CHECK(std::count(seen.begin(), seen.end(), 1) == static_cast<std::ptrdiff_t>(contacts.size()));
+  checkParts(coloring);
+  const ContactColoring other = coloured(3);
+  bool same = true;
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    same = same && coloring.rows()[k].contact == other.rows()[k].contact;
+  }
+  CHECK(same);
 }
 
 // Seen to fail: a task for each part.

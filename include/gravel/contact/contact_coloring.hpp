@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <numeric>
 #include <span>
 #include <string>
 #include <utility>
@@ -22,8 +23,11 @@ namespace gravel {
 /// alone. Fixed bodies and boundaries take part in any number of contacts of a colour. Contacts that find no
 /// colour among 62 (of a body with very many partners) go to an overflow group that is solved serially.
 /// Contacts that share no movable body with any other make up a group of their own, the lone ones, which are
-/// exact after one blow. Keeps most of its workspace; O(contacts), with a sort of those bodies that are first
-/// in no contact, and O(bodies) once for the largest number of them.
+/// exact after one blow. Of more bodies than caches hold, contacts within a block of bodies whose ids follow
+/// each other come block by block, and in each colour by colour, before the contacts between blocks: bodies
+/// are fetched once in place of once a colour, and blocks are solved at once.
+/// Keeps most of its workspace; O(contacts), with a sort of those bodies that are first in no contact, and
+/// O(bodies) once for the largest number of them.
 class ContactColoring {
  public:
   static constexpr std::size_t maxColours = 62;
@@ -46,24 +50,32 @@ class ContactColoring {
     arrange();
   }
 
-  /// Rows in the order of solving: lone ones, colour 0, 1, …, overflow.
-  std::span<const Row> rows() const { return rows_; }
-  std::size_t loneCount() const { return start_.front(); }
-  std::size_t colours() const { return start_.size() - 2; }
-  /// The same rows in the order of contacts.
-  std::span<const Row> rowsByContact() const { return byContact_; }
-  /// Rows [begin, end) of a colour; the colour `colours()` is the overflow.
-  std::size_t begin(std::size_t colour) const { return start_[colour]; }
-  std::size_t end(std::size_t colour) const { return start_[colour + 1]; }
-
-  /// All rows, for passes over them in which contacts may share bodies: parts of up to `partSize` rows of one
-  /// group (a colour, the lone ones, the overflow), those first that stand first in their groups. So a thread
-  /// that takes its share of the parts has about the rows, and the bodies, that it has when colours are
-  /// shared between threads one by one, and they stay in its cache.
+  /// Rows [begin, end).
   struct Part {
     std::uint32_t begin;
     std::uint32_t end;
   };
+
+  /// Rows in the order of solving: lone ones, within blocks, colour 0, 1, …, overflow.
+  std::span<const Row> rows() const { return rows_; }
+  std::size_t loneCount() const { return loneCount_; }
+  /// Blocks, of which no two share a movable body; none where bodies are few. Then the colours within each.
+  std::size_t blocks() const { return ends_.size(); }
+  std::span<const Part> coloursOf(std::size_t block) const {
+    const std::size_t first = block == 0 ? 0 : ends_[block - 1];
+    return std::span<const Part>(inner_).subspan(first, ends_[block] - first);
+  }
+  std::size_t colours() const { return start_.size() - 2; }
+  /// The same rows in the order of contacts.
+  std::span<const Row> rowsByContact() const { return byContact_; }
+  /// Rows [begin, end) of a colour but those within blocks; the colour `colours()` is the overflow.
+  std::size_t begin(std::size_t colour) const { return start_[colour]; }
+  std::size_t end(std::size_t colour) const { return start_[colour + 1]; }
+
+  /// All rows, for passes over them in which contacts may share bodies: parts of up to `partSize` rows of one
+  /// group (a colour, all blocks, the lone ones, the overflow), those first that stand first in their groups.
+  /// So a thread that takes its share of the parts has about the rows, and the bodies, that it has when
+  /// colours are shared between threads one by one, and they stay in its cache.
   static constexpr std::size_t partSize = 128;
   static constexpr std::size_t fewRows = 4 * partSize;  ///< not worth the threads
   std::span<const Part> parts() const { return parts_; }
@@ -82,10 +94,14 @@ class ContactColoring {
 
  private:
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
-  static constexpr std::uint8_t overflow = maxColours;
-  static constexpr std::uint8_t lone = maxColours + 1;
+  /// Groups: colours within blocks, other colours, and these.
+  static constexpr std::uint8_t overflow = 2 * maxColours;
+  static constexpr std::uint8_t lone = overflow + 1;
 
   static constexpr std::size_t chunk = 8192;
+  /// Slots of a block: the velocities of so many are a quarter of a megabyte in double.
+  static constexpr std::uint32_t blockSize = 4096;
+  static constexpr std::uint32_t fewBodies = 32768;  ///< not worth blocks
 
   /// Bodies in place of slots.
   template <Real S>
@@ -143,60 +159,75 @@ class ContactColoring {
     }
   }
 
+  /// Of each contact its group, and how many of each group there are among those whose first bodies are of
+  /// one block, which are neighbours in the list.
   void choose() {
     constexpr std::uint64_t all = (std::uint64_t{1} << maxColours) - 1;
     used_.assign(movable_.size(), 0);
-    detail::resizeSparingly(colour_, byContact_.size());
+    detail::resizeSparingly(group_, byContact_.size());
+    places_.assign(staticSlot() / blockSize + 1, Places{});
+    colours_ = 0;
+    const bool inBlocks = staticSlot() > fewBodies;
     for (std::size_t k = 0; k < byContact_.size(); ++k) {
-      Row& row = byContact_[k];
-      if (degree_[row.slot1] <= 1 && degree_[row.slot2] <= 1) {
-        colour_[k] = lone;
-        continue;
+      const auto [contact, slot1, slot2] = byContact_[k];
+      const std::uint32_t block = slot1 / blockSize;
+      group_[k] = lone;
+      if (degree_[slot1] > 1 || degree_[slot2] > 1) {
+        const std::uint64_t free = ~(used_[slot1] | used_[slot2]) & all;
+        group_[k] = overflow;
+        if (free != 0) {
+          const auto colour = static_cast<std::uint8_t>(std::countr_zero(free));
+          colours_ = std::max<std::size_t>(colours_, colour + 1U);
+          used_[slot1] |= std::uint64_t{movable_[slot1]} << colour;
+          used_[slot2] |= std::uint64_t{movable_[slot2]} << colour;
+          const bool within = inBlocks && (movable_[slot2] == 0 || slot2 / blockSize == block);
+          group_[k] = static_cast<std::uint8_t>(within ? colour : maxColours + colour);
+        }
       }
-      const std::uint64_t taken = used_[row.slot1] | used_[row.slot2];
-      const std::uint64_t free = ~taken & all;
-      if (free == 0) {
-        colour_[k] = overflow;
-        continue;
-      }
-      const std::uint64_t bit = free & (~free + 1);
-      colour_[k] = static_cast<std::uint8_t>(std::countr_zero(bit));
-      used_[row.slot1] |= movable_[row.slot1] != 0 ? bit : 0;
-      used_[row.slot2] |= movable_[row.slot2] != 0 ? bit : 0;
+      ++places_[block][group_[k]];
     }
   }
 
-  /// By colour, within one in the order of contacts: first how many there are in each part of the list, then
-  /// each part finds its places.
+  /// Rows by group, within one in the order of contacts.
   void arrange() {
-    const std::size_t n = byContact_.size();
-    places_.assign(n / chunk + 1, Places{});
-    parallelForChunks<Share::Alike>(n, chunk, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t k = begin; k < end; ++k) {
-        ++places_[begin / chunk][colour_[k]];
-      }
-    });
+    std::vector<std::size_t> first{0};  // contact of each block
+    for (const Places& counts : places_) {
+      first.push_back(std::accumulate(counts.begin(), counts.end(), first.back()));
+    }
     std::size_t next = 0;
-    const auto place = [&](std::uint8_t colour) {
-      for (Places& part : places_) {
-        next += std::exchange(part[colour], next);
+    const auto place = [&](std::size_t group) {
+      for (Places& block : places_) {
+        next += std::exchange(block[group], next);
       }
     };
     place(lone);
-    start_.assign(1, next);
-    for (std::uint8_t c = 0; c < maxColours; ++c) {
-      place(c);
-      if (next == start_.back()) {
-        break;  // greedy colours leave no gaps
+    loneCount_ = next;
+    inner_.clear();
+    ends_.clear();
+    for (Places& block : places_) {
+      for (std::size_t colour = 0; colour < colours_; ++colour) {
+        const auto begin = static_cast<std::uint32_t>(next);
+        next += std::exchange(block[colour], next);
+        if (next > begin) {
+          inner_.push_back({begin, static_cast<std::uint32_t>(next)});
+        }
       }
+      ends_.push_back(inner_.size());
+    }
+    if (inner_.empty()) {
+      ends_.clear();
+    }
+    start_.assign(1, next);
+    for (std::size_t colour = 0; colour < colours_; ++colour) {
+      place(maxColours + colour);
       start_.push_back(next);
     }
     place(overflow);
-    start_.push_back(n);
-    detail::resizeSparingly(rows_, n);
-    parallelForChunks<Share::Alike>(n, chunk, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t k = begin; k < end; ++k) {
-        rows_[places_[begin / chunk][colour_[k]]++] = byContact_[k];
+    start_.push_back(next);
+    detail::resizeSparingly(rows_, byContact_.size());
+    parallelForTasks<Share::Alike>(places_.size(), [&](std::size_t block) {
+      for (std::size_t k = first[block]; k < first[block + 1]; ++k) {
+        rows_[places_[block][group_[k]]++] = byContact_[k];
       }
     });
     cut();
@@ -207,23 +238,29 @@ class ContactColoring {
     parts_.clear();
     shared_ = false;
     std::vector<std::pair<double, Part>> all;  // with where its middle stands in its group, 0 … 1
-    const auto add = [&](std::size_t begin, std::size_t end, bool serial) {
-      const std::size_t rows = end - begin;
-      const detail::Chunks chunks(rows, partSize);
-      const bool isShared = rows >= fewRows && !serial;
+    // Rows [begin, end) of the group of rows [from, to). Groups that are not shared are the calling thread's:
+    // it begins with them.
+    const auto add = [&](std::size_t begin, std::size_t end, std::size_t from, std::size_t to,
+                         bool isShared) {
       shared_ = shared_ || isShared;
+      const detail::Chunks chunks(end - begin, partSize);
       for (std::size_t c = 0; c < chunks.count(); ++c) {
-        const std::size_t middle = chunks.begin(c) + chunks.end(c);
-        // Groups that are not shared are the calling thread's: it begins with them.
-        const double place = isShared ? static_cast<double>(middle) / static_cast<double>(2 * rows) : 0.0;
-        all.push_back({place,
-                       {static_cast<std::uint32_t>(begin + chunks.begin(c)),
-                        static_cast<std::uint32_t>(begin + chunks.end(c))}});
+        const Part part{static_cast<std::uint32_t>(begin + chunks.begin(c)),
+                        static_cast<std::uint32_t>(begin + chunks.end(c))};
+        const double middle = 0.5 * (static_cast<double>(part.begin) + static_cast<double>(part.end));
+        all.push_back(
+            {isShared ? (middle - static_cast<double>(from)) / static_cast<double>(to - from) : 0.0, part});
       }
     };
-    add(0, loneCount(), false);
+    const auto addGroup = [&](std::size_t begin, std::size_t end, bool serial) {
+      add(begin, end, begin, end, end - begin >= fewRows && !serial);
+    };
+    addGroup(0, loneCount(), false);
+    for (const Part& colour : inner_) {
+      add(colour.begin, colour.end, loneCount(), start_.front(), true);
+    }
     for (std::size_t colour = 0; colour <= colours(); ++colour) {
-      add(begin(colour), end(colour), colour == colours());
+      addGroup(begin(colour), end(colour), colour == colours());
     }
     std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
     for (const auto& part : all) {
@@ -235,72 +272,19 @@ class ContactColoring {
   std::vector<Row> byContact_;
   std::vector<Part> parts_;
   bool shared_ = false;  ///< any group is shared between threads
-  using Places = std::array<std::size_t, maxColours + 2>;
-  std::vector<Places> places_;  ///< by part of the list
+  using Places = std::array<std::size_t, 2 * maxColours + 2>;
+  std::vector<Places> places_;  ///< by block of first bodies, of its next row in each group
+  std::size_t loneCount_ = 0;
+  std::vector<Part> inner_;        ///< rows of the colours of blocks
+  std::vector<std::size_t> ends_;  ///< by block, there
+  std::size_t colours_ = 0;
   std::vector<std::size_t> start_{0, 0};
   std::vector<std::uint32_t> bodyOfSlot_;
   std::vector<std::uint32_t> slotOfBody_;
   std::vector<std::uint32_t> degree_;
   std::vector<std::uint8_t> movable_;
-  std::vector<std::uint8_t> colour_;
+  std::vector<std::uint8_t> group_;
   std::vector<std::uint64_t> used_;
 };
-
-namespace detail {
-
-/// Calls f(from, to, sum), which adds to the sum, for the parts of rows [begin, end) that share no movable
-/// body, shared between threads where they are many; parts depend on their number alone.
-template <class T, class F>
-T sumOverParts(std::size_t begin, std::size_t end, const T& zero, F&& f) {
-  const auto run = [&](std::size_t from, std::size_t to) {
-    T sum = zero;
-    f(from, to, sum);
-    return sum;
-  };
-  if (end - begin < ContactColoring::fewRows) {
-    return run(begin, end);
-  }
-  return orderedSum(end - begin, ContactColoring::partSize, zero,
-                    [&](std::size_t from, std::size_t to) { return run(begin + from, begin + to); });
-}
-
-/// Calls f(from, to, sum) for all parts of the rows at once: they may share bodies.
-template <class T, class F>
-T sumOverAllParts(const ContactColoring& colouring, const T& zero, F&& f) {
-  return orderedSum(colouring.parts().size(), colouring.partsOfTask(), zero,
-                    [&](std::size_t begin, std::size_t end) {
-                      T sum = zero;
-                      for (std::size_t p = begin; p < end; ++p) {
-                        const ContactColoring::Part& part = colouring.parts()[p];
-                        f(std::size_t{part.begin}, std::size_t{part.end}, sum);
-                      }
-                      return sum;
-                    });
-}
-
-/// The same without a sum.
-template <class F>
-void forAllParts(const ContactColoring& colouring, F&& f) {
-  parallelFor(colouring.parts().size(), colouring.partsOfTask(), [&](std::size_t p) {
-    const ContactColoring::Part& part = colouring.parts()[p];
-    f(std::size_t{part.begin}, std::size_t{part.end});
-  });
-}
-
-/// As sumOverParts() over all rows but the lone ones, colour after colour, and the overflow one by one.
-template <class T, class F>
-T sumOverColourParts(const ContactColoring& colouring, const T& zero, F&& f) {
-  T sum = zero;
-  for (std::size_t c = 0; c < colouring.colours(); ++c) {
-    sum += sumOverParts(colouring.begin(c), colouring.end(c), zero, f);
-  }
-  const std::size_t overflow = colouring.colours();
-  for (std::size_t k = colouring.begin(overflow); k < colouring.end(overflow); ++k) {
-    f(k, k + 1, sum);
-  }
-  return sum;
-}
-
-}  // namespace detail
 
 }  // namespace gravel

@@ -4,6 +4,7 @@
 /// All contacts of a step in the form that solvers work on: compact copies of the bodies (eight Scalars each)
 /// and one row a contact. Layouts and user's arrays end here.
 
+#include <gravel/contact/coloured_rows.hpp>
 #include <gravel/contact/impulse_list.hpp>
 #include <gravel/contact/problem_bodies.hpp>
 #include <gravel/contact/resting_gap.hpp>

@@ -3,7 +3,7 @@
 /// \file
 /// Removes overlap by moving positions: no energy of motion is made.
 
-#include <gravel/contact/contact_coloring.hpp>
+#include <gravel/contact/coloured_rows.hpp>
 #include <gravel/contact/contact_facts.hpp>
 #include <gravel/contact/overlap_lanes.hpp>
 #include <gravel/contact/row_watch.hpp>
