@@ -366,6 +366,8 @@ TEST_CASE("Values that cannot be are refused by name where a file's checksum is 
   }
   refuses("numbers of planes", std::uint64_t{77}, "planes that are not in the order of their numbers");
   refuses("material", std::uint32_t{77}, "material of body 0 is 77; allowed: 0");
+  refuses("materials", -1.0, "restitution of material 0 is -1");
+  refuses("materials of contacts", nan, "restitution of a contact is nan");
   refuses("domain", std::uint32_t{77}, "a domain of an unknown kind");
 }
 

@@ -134,6 +134,7 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
   for (std::size_t k = 0; k < names.size() / 4; ++k) {
     const std::uint64_t* name = &names[4 * k];
     const Scalar* c = &places[10 * k];
+    validate(pairs[k], "a contact");
     contacts_.push_back({static_cast<std::uint32_t>(name[0]),
                          static_cast<std::uint32_t>(name[1]),
                          name[2],

@@ -80,8 +80,13 @@ class MaterialTable {
   const std::vector<MaterialPair<Scalar>>& pairs() const { return pairs_; }
   /// As of the last renewed().
   MaterialView<Scalar> view() const { return {entries_, pairs_}; }
-  /// \param entries at least one
-  void assign(std::vector<Material<Scalar>> entries) { entries_ = std::move(entries); }
+  /// \param entries at least one \throws std::invalid_argument on coefficients out of range
+  void assign(std::vector<Material<Scalar>> entries) {
+    for (std::size_t k = 0; k < entries.size(); ++k) {
+      validate(entries[k], "material " + std::to_string(k));
+    }
+    entries_ = std::move(entries);
+  }
 
  private:
   static Material<Scalar> ownOf(const Config& c) {

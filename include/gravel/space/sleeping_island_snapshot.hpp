@@ -119,6 +119,7 @@ class IslandReader {
       if (material_ == materials_.size()) {
         in_.fail("holds too few materials of sleepers");
       }
+      validate(materials_[material_], "a sleeper");
       island.contacts.push_back(c, {materials_[material_++], drift});
     }
     for (std::uint64_t k = 0; k < memory; ++k) {
