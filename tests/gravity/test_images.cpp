@@ -489,3 +489,22 @@ TEST_CASE("With images expansions are taken from fewer bodies on, and a bad tole
   DirectSum<double> sum;
   CHECK_THROWS_WITH(sum.setImageTolerance(0.0), ContainsSubstring("image tolerance is 0"));
 }
+
+// Seen to fail: without the refusal the search for near images does not end.
+TEST_CASE("A domain too long for its images is refused, and the one before stays") {
+  DirectSum<double> sum;
+  sum.setDomain(Domain<double>::periodic({2, 3, 4}));
+  for (const Vector3<double>& edges :
+       {Vector3<double>(1001, 1, 2), Vector3<double>(1, 1e-320, 1), Vector3<double>(1, 2, 1e308)}) {
+    CHECK_THROWS_WITH(sum.setDomain(Domain<double>::periodic(edges)),
+                      ContainsSubstring("longest edge of a domain with gravity"));
+  }
+  CHECK_THROWS_WITH(sum.setDomain(Domain<double>::shearPeriodic({1, 2e5, 1}, 1)),
+                    ContainsSubstring("is 2e+05; allowed: at most 10000, 10000 times the shortest"));
+  const std::vector<Vector3<double>> x{{0, 0, 0}, {1, 1, 1}};
+  const std::vector<double> m{1, 1};
+  const double before = DirectSum<double>().potentialEnergy(x, m, 1.0, 0.0);
+  CHECK(sum.potentialEnergy(x, m, 1.0, 0.0) != before);  // images still pull
+  CHECK_NOTHROW(sum.setDomain(Domain<double>::periodic({1000, 1, 1})));
+  CHECK_NOTHROW(sum.setDomain(Domain<double>::shearPeriodic({1, 1, 1e300}, 1)));  // gravity is open in z
+}

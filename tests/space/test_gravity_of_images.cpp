@@ -202,3 +202,15 @@ TEST_CASE("Bodies of a box that merge keep momentum, and the ledger closes") {
 }
 
 }  // namespace test_gravity_of_images
+
+// Seen to fail: domains that are asked for only when forces are.
+TEST_CASE("A domain too long for gravity is refused at once, and so is gravity in it") {
+  Space<double> space;  // with G
+  const Domain<double> slab = Domain<double>::periodic({1e4, 1, 1});
+  CHECK_THROWS_WITH(space.setDomain(slab), ContainsSubstring("longest edge of a domain with gravity"));
+  CHECK(space.domain().isOpen());
+  space.setG(0);
+  space.setDomain(slab);
+  CHECK_THROWS_WITH(space.setG(1), ContainsSubstring("longest edge of a domain with gravity"));
+  CHECK(space.getG() == 0.0);
+}

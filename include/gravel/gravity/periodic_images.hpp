@@ -9,6 +9,25 @@
 
 namespace gravel::detail {
 
+/// \throws std::invalid_argument for a domain so long that to sum its images takes minutes: the near ones of
+/// a box go as the square of the ratio of its edges
+template <Real S>
+void requireFewImages(const Domain<S>& domain) {
+  if (domain.isOpen()) {
+    return;
+  }
+  const bool isPatch = domain.kind() == DomainKind::ShearPeriodic;
+  const Vector3<S>& edges = domain.lengths();
+  const S third = isPatch ? edges[1] : edges[2];
+  const S longest = std::max<S>(std::max<S>(edges[0], edges[1]), third);
+  const S shortest = std::min<S>(std::min<S>(edges[0], edges[1]), third);
+  const S most(isPatch ? 1e4 : 1e3);
+  if (!(longest / most <= shortest)) {
+    refuse("longest edge of a domain with gravity", formatReal(longest),
+           "at most " + formatReal(S(most * shortest)) + ", " + formatReal(most) + " times the shortest");
+  }
+}
+
 /// The lattice of images of a domain: of the whole box in a periodic one; of its x (sheared) and y in a
 /// shear-periodic one, which gravity sees open in z. S is the scalar of bodies, F that of expansions.
 ///
@@ -18,8 +37,9 @@ namespace gravel::detail {
 template <Real S, Real F>
 class PeriodicImages {
  public:
-  /// \param time [s] for a domain that shears
+  /// \param time [s] for a domain that shears \throws std::invalid_argument of requireFewImages()
   void setDomain(const Domain<S>& domain, const S& time) {
+    requireFewImages(domain);
     domain_ = domain;
     time_ = time;
   }

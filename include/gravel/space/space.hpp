@@ -128,7 +128,8 @@ class Space : public Settings<Scalar> {
   /// velocities and spins are those in the frame, its potential is part of the potential energy, and the
   /// shear does its `work` where bodies or contacts cross an edge in x. With gravity the images of all bodies
   /// pull: see DirectSum::setDomain. What the shear does to gravity across an edge is not in the ledger.
-  /// \throws std::invalid_argument for a shear-periodic domain unless config.integrator is SymplecticEpicycle
+  /// \throws std::invalid_argument for a patch unless config.integrator is SymplecticEpicycle; with gravity,
+  /// as setG() does, for a box of more than 1000 times its shortest edge, or a patch of 1e4 times
   void setDomain(const Domain<Scalar>& domain);
   const Domain<Scalar>& domain() const { return contact_.domain; }
 

@@ -169,6 +169,9 @@ template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::setDomain(const Domain<Scalar>& domain) {
   this->inStep_.refuse("setDomain()");
   checkIntegratorIn(domain);
+  if (!(getG() == Scalar(0))) {
+    detail::requireFewImages(domain);
+  }
   const bool turns = HillFrame<Scalar>(domain).turns() || HillFrame<Scalar>(contact_.domain).turns();
   if (turns || !(getG() == Scalar(0))) {
     changePotential([&] { contact_.domain = domain; });
@@ -185,6 +188,9 @@ void Space<Scalar, Layout>::setG(Scalar g) {
   SimulationConfig<Scalar> next = this->config_;
   next.G = g;
   next.validate();
+  if (!(g == Scalar(0))) {
+    detail::requireFewImages(contact_.domain);
+  }
   changePotential([&] { this->config_.G = g; });
 }
 

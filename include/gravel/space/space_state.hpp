@@ -252,6 +252,9 @@ void Space<Scalar, Layout>::restore(const std::string& path) {
   numbers.validate();
   ContactStage<Scalar, Layout> contact;
   contact.load(in);
+  if (!(config.G == Scalar(0))) {
+    detail::requireFewImages(contact.domain);
+  }
   SleepStage<Scalar, Layout> sleep;
   sleep.load(in);
   gravel::Bodies<Scalar, SoA> bodies = loadBodies<Scalar>(in);
