@@ -248,8 +248,8 @@ class ContactColoring {
         const Part part{static_cast<std::uint32_t>(begin + chunks.begin(c)),
                         static_cast<std::uint32_t>(begin + chunks.end(c))};
         const double middle = 0.5 * (static_cast<double>(part.begin) + static_cast<double>(part.end));
-        all.push_back(
-            {isShared ? (middle - static_cast<double>(from)) / static_cast<double>(to - from) : 0.0, part});
+        all.emplace_back(
+            isShared ? (middle - static_cast<double>(from)) / static_cast<double>(to - from) : 0.0, part);
       }
     };
     const auto addGroup = [&](std::size_t begin, std::size_t end, bool serial) {
