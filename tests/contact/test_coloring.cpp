@@ -423,6 +423,23 @@ TEST_CASE(
   CHECK(same);
 }
 
+// Rows of one block would be written over those of another. Seen to fail: taken as they come.
+TEST_CASE("contacts out of the order of their keys are refused") {
+  Bodies<double, SoA> bodies;
+  Body<double> body;
+  body.radius = 1;
+  for (int i = 0; i < 4; ++i) {
+    bodies.add(body);
+  }
+  const std::vector<Contact<double>> contacts{{1, 2, 1, 2, {1, 0, 0}, -1.0, 1.0, 1.0},
+                                              {2, 3, 2, 3, {1, 0, 0}, -1.0, 1.0, 1.0},
+                                              {0, 1, 0, 1, {1, 0, 0}, -1.0, 1.0, 1.0},
+                                              {1, 3, 1, 3, {1, 0, 0}, -1.0, 1.0, 1.0}};
+  ContactColoring coloring;
+  CHECK_THROWS_WITH(coloring.build(std::span<const Contact<double>>(contacts), bodies),
+                    ContainsSubstring("place of a contact is"));
+}
+
 // Seen to fail: a task for each part.
 TEST_CASE("passes over all rows open no parallel region where no colour is shared between threads") {
   const Bodies<double, SoA> bodies = randomCloud<double>(500, 7.0, 8);

@@ -41,7 +41,8 @@ class ContactColoring {
   };
 
   /// \param contacts sorted by keys, which are the ids of the bodies
-  /// \throws std::invalid_argument for a contact of a body that is not there, or of a body with itself
+  /// \throws std::invalid_argument for a contact of a body that is not there, or of a body with itself, or
+  /// out of order
   template <Real S, ContactBodies B>
   void build(std::span<const Contact<S>> contacts, const B& bodies) {
     takeEnds(contacts, bodies.size());
@@ -170,6 +171,9 @@ class ContactColoring {
     const bool inBlocks = staticSlot() > fewBodies;
     for (std::size_t k = 0; k < byContact_.size(); ++k) {
       const auto [contact, slot1, slot2] = byContact_[k];
+      if (k > 0 && slot1 < byContact_[k - 1].slot1) {
+        detail::refuse("place of a contact", std::to_string(k), "that in the order of keys");
+      }
       const std::uint32_t block = slot1 / blockSize;
       group_[k] = lone;
       if (degree_[slot1] > 1 || degree_[slot2] > 1) {
