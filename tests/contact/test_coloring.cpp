@@ -69,6 +69,18 @@ Graph randomGraph(std::size_t n, double degree, std::uint64_t seed, bool bothWay
   return graph;
 }
 
+/// n of radius 1, of which one in `period` is fixed.
+Bodies<double, SoA> someFixed(std::uint32_t n, std::uint32_t period) {
+  Bodies<double, SoA> bodies;
+  for (std::uint32_t i = 0; i < n; ++i) {
+    Body<double> body;
+    body.radius = 1;
+    body.fixed = i % period == 3;
+    bodies.add(body);
+  }
+  return bodies;
+}
+
 /// The parts are all rows, each once; and of all groups of rows that threads share one by one, the same share
 /// has gone by at any time, but for a part of each.
 // Seen to fail: parts in the order of the colours.
@@ -249,13 +261,7 @@ TEST_CASE("all contacts of a fixed body with single grains are one group") {
 // Seen to fail: parts that write from the places of the first; parts in the other order.
 TEST_CASE("colours, and the order within one, are those of one walk along a list of many parts") {
   constexpr std::uint32_t n = 12000;
-  Bodies<double, SoA> bodies;
-  for (std::uint32_t i = 0; i < n; ++i) {
-    Body<double> body;
-    body.radius = 1;
-    body.fixed = i % 50 == 3;
-    bodies.add(body);
-  }
+  const Bodies<double, SoA> bodies = someFixed(n, 50);
   const CounterRandom random(5);
   std::set<std::pair<std::uint32_t, std::uint32_t>> pairs;
   for (std::uint64_t k = 0; k < 40000; ++k) {
@@ -333,13 +339,7 @@ TEST_CASE(
     "body") {
   constexpr std::uint32_t side = 36;
   constexpr std::uint32_t n = side * side * side;
-  Bodies<double, SoA> bodies;
-  for (std::uint32_t i = 0; i < n; ++i) {
-    Body<double> body;
-    body.radius = 1;
-    body.fixed = i % 97 == 3;
-    bodies.add(body);
-  }
+  const Bodies<double, SoA> bodies = someFixed(n, 97);
   std::set<std::pair<std::uint32_t, std::uint32_t>> pairs;
   for (std::uint32_t i = 0; i < n - 2000; ++i) {  // neighbours in a lattice
     for (const std::uint32_t ahead : {1U, side, side * side}) {
@@ -425,12 +425,7 @@ TEST_CASE(
 
 // Rows of one block would be written over those of another. Seen to fail: taken as they come.
 TEST_CASE("contacts out of the order of their keys are refused") {
-  Bodies<double, SoA> bodies;
-  Body<double> body;
-  body.radius = 1;
-  for (int i = 0; i < 4; ++i) {
-    bodies.add(body);
-  }
+  const Bodies<double, SoA> bodies = someFixed(4, 50);
   const std::vector<Contact<double>> contacts{{1, 2, 1, 2, {1, 0, 0}, -1.0, 1.0, 1.0},
                                               {2, 3, 2, 3, {1, 0, 0}, -1.0, 1.0, 1.0},
                                               {0, 1, 0, 1, {1, 0, 0}, -1.0, 1.0, 1.0},

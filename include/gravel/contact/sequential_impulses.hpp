@@ -100,7 +100,8 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       const bool ends = !(change > enough);
       const bool last = report.iterations >= settings.maxIterations;
       const bool half = report.iterations == settings.maxIterations - settings.maxIterations / 2;
-      // A slip that goes back by a share of itself a sweep is some changes long, and will be none.
+      // A slip that goes back by a share of itself a sweep is many changes long, and will be none. With half
+      // of the sweeps gone there is no time to wait for that. See docs/theory-contact.md, "Who slides".
       const S lasts = S(ends ? 32 : 4) * change;
       const bool more = !last && (ends || half) && problem.letSlide(colouring, lasts);
       if (last || (ends && !more)) {

@@ -9,11 +9,12 @@
 
 namespace gravel::detail {
 
+/// \param G of gravity; where it is 0 any domain will do
 /// \throws std::invalid_argument for a domain so long that to sum its images takes minutes: the near ones of
 /// a box go as the square of the ratio of its edges
 template <Real S>
-void requireFewImages(const Domain<S>& domain) {
-  if (domain.isOpen()) {
+void requireFewImages(const Domain<S>& domain, const S& G) {
+  if (G == S(0) || domain.isOpen()) {
     return;
   }
   const bool isPatch = domain.kind() == DomainKind::ShearPeriodic;
@@ -39,7 +40,7 @@ class PeriodicImages {
  public:
   /// \param time [s] for a domain that shears \throws std::invalid_argument of requireFewImages()
   void setDomain(const Domain<S>& domain, const S& time) {
-    requireFewImages(domain);
+    requireFewImages(domain, S(1));
     domain_ = domain;
     time_ = time;
   }

@@ -169,9 +169,7 @@ template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::setDomain(const Domain<Scalar>& domain) {
   this->inStep_.refuse("setDomain()");
   checkIntegratorIn(domain);
-  if (!(getG() == Scalar(0))) {
-    detail::requireFewImages(domain);
-  }
+  detail::requireFewImages(domain, getG());
   const bool turns = HillFrame<Scalar>(domain).turns() || HillFrame<Scalar>(contact_.domain).turns();
   if (turns || !(getG() == Scalar(0))) {
     changePotential([&] { contact_.domain = domain; });
@@ -188,9 +186,7 @@ void Space<Scalar, Layout>::setG(Scalar g) {
   SimulationConfig<Scalar> next = this->config_;
   next.G = g;
   next.validate();
-  if (!(g == Scalar(0))) {
-    detail::requireFewImages(contact_.domain);
-  }
+  detail::requireFewImages(contact_.domain, g);
   changePotential([&] { this->config_.G = g; });
 }
 

@@ -252,9 +252,7 @@ void Space<Scalar, Layout>::restore(const std::string& path) {
   numbers.validate();
   ContactStage<Scalar, Layout> contact;
   contact.load(in);
-  if (!(config.G == Scalar(0))) {
-    detail::requireFewImages(contact.domain);
-  }
+  detail::requireFewImages(contact.domain, config.G);
   SleepStage<Scalar, Layout> sleep;
   sleep.load(in);
   gravel::Bodies<Scalar, SoA> bodies = loadBodies<Scalar>(in);
