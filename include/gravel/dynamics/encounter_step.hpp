@@ -102,16 +102,27 @@ class EncounterTable {
 /// The largest (rate T)^8 of a body with its likeliest partner, and the largest (T speed)^2 / (radius/4)^2.
 /// O(N).
 template <class S, Real Scalar, class Layout>
-void lookAtLikeliest(const Bodies<Scalar, Layout>& bodies, const S& G, const S& softening, const S& T, S& sum,
-                     S& approach) {
+void lookAtLikeliest(const Bodies<Scalar, Layout>& bodies, const Domain<Scalar>& domain, const S& G,
+                     const S& softening, const S& T, S& sum, S& approach) {
+  using std::sqrt;
   const std::size_t n = bodies.size();
+  S largest(0);
+  bool anchored = false;
+  for (std::size_t i = 0; i < n; ++i) {
+    largest = std::max<S>(largest, S(bodies.radii()[i]));
+    anchored = anchored || bodies[i].isFixed();
+  }
+  const Domain<Scalar> moves = anchored ? Domain<Scalar>::open() : domain;
+  const auto lessFlow = [&](std::size_t i, const Vector3<Scalar>& v) {
+    return Vector3<S>(moves.lessFlow(bodies[i].position(), v).template cast<S>());
+  };
   S mass(0);
   Vector3<S> v_cm = Vector3<S>::Zero();
   Vector3<S> a_cm = Vector3<S>::Zero();
   for (std::size_t i = 0; i < n; ++i) {
     const S m = S(bodies.masses()[i]);
     mass += m;
-    v_cm += bodies[i].countingVelocity().template cast<S>() * m;
+    v_cm += lessFlow(i, bodies[i].countingVelocity()) * m;
     a_cm += bodies.accelerations()[i].template cast<S>() * m;
   }
   if (mass > S(0)) {
@@ -119,8 +130,9 @@ void lookAtLikeliest(const Bodies<Scalar, Layout>& bodies, const S& G, const S& 
     a_cm /= mass;
   }
   const auto speedSq = [&](std::size_t i) {
-    return S(Vector3<S>(bodies.velocities()[i].template cast<S>() - v_cm).squaredNorm() * T * T);
+    return S(Vector3<S>(lessFlow(i, bodies.velocities()[i]) - v_cm).squaredNorm() * T * T);
   };
+  const S sheared = S(moves.shearRate()) * T * largest;
   const S Gm = G * mass / S(static_cast<double>(n)) * T * T;
   sum = -orderedMin(n, 2048, S(0), [&](std::size_t i) {
     const auto body = bodies[i];
@@ -136,7 +148,15 @@ void lookAtLikeliest(const Bodies<Scalar, Layout>& bodies, const S& G, const S& 
   });
   approach = -orderedMin(n, 2048, S(0), [&](std::size_t i) {
     const S r = S(bodies.radii()[i]);
-    return r > S(0) && !bodies[i].isFixed() ? S(-S(16) * speedSq(i) / (r * r)) : S(0);
+    if (!(r > S(0)) || bodies[i].isFixed()) {
+      return S(0);
+    }
+    const S moved_sq = speedSq(i);
+    if (!(sheared > S(0))) {
+      return S(-S(16) * moved_sq / (r * r));
+    }
+    const S way = (moved_sq > S(0) ? S(sqrt(moved_sq)) : S(0)) + sheared;
+    return S(-S(16) * way * way / (r * r));
   });
 }
 
@@ -147,25 +167,25 @@ void lookAtLikeliest(const Bodies<Scalar, Layout>& bodies, const S& G, const S& 
 /// as their gravity. Above O(N); there it is enough, too, if no sphere moves by more than a quarter of its
 /// radius, relative to the common centre of mass, and only where that asks for a shorter step pairs are
 /// searched, in O(N log N).
-/// \param pairs false where pairs may be nearest through images: above is then meant for any number, and no
-///        sphere moves by more than a quarter of its radius
+/// \param domain unless open, pairs may be nearest through images: above is then meant for any number, and no
+///        sphere moves by more than a quarter of its radius, the flow left out as in adaptive_step.hpp
 template <Real Scalar, class Layout>
 Scalar stepFromEncounters(const Bodies<Scalar, Layout>& bodies, const Scalar& G, const Scalar& softening,
-                          const StepLimits<Scalar>& limits, bool pairs = true) {
+                          const StepLimits<Scalar>& limits, const Domain<Scalar>& domain = {}) {
   using S = detail::RateScalar<Scalar>;
   using std::sqrt;
   const S T = S(limits.largest) / S(limits.factor);
   S sum(0);
   S approach(0);
   const bool few = bodies.size() <= encounterPairs;
-  if (pairs && few) {
+  if (domain.isOpen() && few) {
     detail::EncounterTable<S>(bodies).look(S(G), S(softening), T, sum, approach);
   } else {
-    detail::lookAtLikeliest<S>(bodies, S(G), S(softening), T, sum, approach);
+    detail::lookAtLikeliest<S>(bodies, domain, S(G), S(softening), T, sum, approach);
   }
   S h = S(limits.largest) / detail::eighthRoot(S(S(1) + sum));
   const S longest = S(limits.contactSteps) * T;  // over the square root of an approach
-  if (pairs && !few && longest < h * sqrt(approach)) {
+  if (domain.isOpen() && !few && longest < h * sqrt(approach)) {
     const S enough = approach / (T * T);
     const S most = detail::NearestMeeting<S>(bodies).mostRateSq(enough);
     approach = most < enough ? S(T * T * most) : approach;

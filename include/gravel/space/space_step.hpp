@@ -221,11 +221,11 @@ void Space<Scalar, Layout>::updateAdaptiveTimeStep() {
   const bool pulls = !(getG() == Scalar(0)) && n() > 1;
   // Something at rest outside, or a force whose law is not known, counts by the motion of single bodies.
   if (!pulls || force_.hook || !contact_.boundaries.empty()) {
-    wanted = stepFromMotion(bodies_, c.softening, limits, !contact_.boundaries.empty());
+    wanted = stepFromMotion(bodies_, c.softening, limits, !contact_.boundaries.empty(), contact_.domain);
   }
   if (pulls) {
-    wanted = std::min<Scalar>(
-        wanted, stepFromEncounters(bodies_, getG(), c.softening, limits, contact_.domain.isOpen()));
+    wanted =
+        std::min<Scalar>(wanted, stepFromEncounters(bodies_, getG(), c.softening, limits, contact_.domain));
     wanted = std::clamp<Scalar>(limits.contactSteps * piles_.longest(bodies_, contacts().contacts),
                                 limits.smallest, wanted);
   }

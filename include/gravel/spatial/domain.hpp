@@ -79,6 +79,13 @@ class Domain {
   /// Speed [m s^-1] by which the image one box further out in x lags in y; 0 unless shear-periodic.
   S shearSpeed() const { return S(1.5) * omega_ * lengths_[0]; }
 
+  /// [s^-1] Size of the rate at which the flow shears.
+  S shearRate() const { return omega_ < S(0) ? S(S(-1.5) * omega_) : S(S(1.5) * omega_); }
+  /// A velocity at x less that of the unperturbed flow there; the velocity itself unless shear-periodic.
+  [[gnu::always_inline]] inline Vector3<S> lessFlow(const Vector3<S>& x, const Vector3<S>& v) const {
+    return {v[0], v[1] + S(1.5) * omega_ * x[0], v[2]};
+  }
+
   /// Distance [m] by which that image lags in y at `time`, brought into [-Ly/2, Ly/2].
   S shearOffset(const S& time) const {
     if (kind_ != DomainKind::ShearPeriodic) {
