@@ -373,8 +373,12 @@ TEST_CASE("a user's own scalar has neighbour lists as well") {
 TEST_CASE(
     "a list asked to hold for a whole way has every pair that meets on it, swift bodies and turns included, "
     "whatever all have in common") {
-  const auto open = Domain<double>::open();
-  for (const double common : {0.0, 0.05, 3.0, 1e6}) {
+  // In the box no two get further apart than half an edge as they fly.
+  const auto box = Domain<double>::periodic({17, 18, 19});
+  int run = 0;
+  for (const double common : {0.0, 0.05, 3.0, 1e6, 0.0, 0.05, 3.0, 1e3}) {
+    CAPTURE(run, common);
+    const Domain<double> domain = run++ < 4 ? Domain<double>::open() : box;
     const CounterRandom random(3);
     std::size_t met = 0;
     NeighbourList<double> list;
@@ -386,10 +390,10 @@ TEST_CASE(
         ways[i] = all + 2e-4 * random.direction(step * 1000 + i);
         if (i % 100 == 0) {  // three bullets
           const auto at = static_cast<std::size_t>(random.uniform(step * 1000 + i + 500, 0.0, 300.0));
-          ways[i] = all + cloud.positions[at] - cloud.positions[i];
+          ways[i] = all + domain.minimumImage(cloud.positions[at] - cloud.positions[i], 0.0);
         }
       }
-      list.update(cloud.positions, cloud.radii, cloud.ids, 0, open, 0.0, 0.0,
+      list.update(cloud.positions, cloud.radii, cloud.ids, 0, domain, 0.0, 0.0,
                   [&](std::size_t i) { return ways[i]; });
       std::vector<Pair> late;
       const std::vector<Vector3<double>> straight = ways;
@@ -403,7 +407,7 @@ TEST_CASE(
       const auto& pairs = list.pairs();
       for (std::uint32_t i = 0; i < cloud.size(); ++i) {
         for (std::uint32_t j = i + 1; j < cloud.size(); ++j) {
-          const Vector3<double> r = cloud.positions[j] - cloud.positions[i];
+          const Vector3<double> r = domain.minimumImage(cloud.positions[j] - cloud.positions[i], 0.0);
           const Vector3<double> v = ways[j] - ways[i];
           const double s = v.squaredNorm() > 0 ? std::clamp(-r.dot(v) / v.squaredNorm(), 0.0, 1.0) : 0.0;
           if ((r + s * v).norm() < cloud.radii[i] + cloud.radii[j]) {
@@ -417,6 +421,8 @@ TEST_CASE(
       }
       for (std::size_t i = 0; i < ways.size(); ++i) {  // who turned off is back again: the list has to last
         cloud.positions[i] += straight[i];
+        Vector3<double> none = Vector3<double>::Zero();
+        domain.wrap(cloud.positions[i], none, 0.0);
       }
     }
     CHECK(met > 200);
@@ -426,9 +432,9 @@ TEST_CASE(
 
 // Seen to fail: 60 searches where all move by more than the skin in a step, with some hundred times the
 // pairs.
-TEST_CASE("in an open domain what all bodies move in common needs no search and adds no pair") {
+TEST_CASE("what all bodies move in common needs no search and adds no pair, across periodic faces, too") {
   const CounterRandom random(8);
-  const auto cost = [&](const Vector3<double>& common, bool bullets) {
+  const auto cost = [&](const Domain<double>& domain, const Vector3<double>& common, bool bullets) {
     NeighbourList<double> list;
     auto cloud = randomCloud<double>(400, 2.0, 0.03, 1.0, 58);
     const auto way = [&](std::size_t i) -> Vector3<double> {
@@ -436,23 +442,26 @@ TEST_CASE("in an open domain what all bodies move in common needs no search and 
     };
     std::size_t pairs = 0;
     for (int step = 0; step < 60; ++step) {
-      pairs = std::max(pairs, list.update(cloud.positions, cloud.radii, cloud.ids, 0, Domain<double>::open(),
-                                          0.0, 0.0, way)
-                                  .size());
+      pairs = std::max(pairs,
+                       list.update(cloud.positions, cloud.radii, cloud.ids, 0, domain, 0.0, 0.0, way).size());
       for (std::size_t i = 0; i < cloud.size(); ++i) {
         cloud.positions[i] += way(i);
+        Vector3<double> none = Vector3<double>::Zero();
+        domain.wrap(cloud.positions[i], none, 0.0);
       }
     }
     return std::pair(list.searches(), pairs);
   };
-  for (const bool bullets : {false, true}) {
-    const auto [searches, pairs] = cost({0, 0, 0}, bullets);
-    CHECK(searches < 20);
-    for (const double common : {0.01, 0.3, 20.0, 1e5}) {
-      CAPTURE(bullets, common);
-      const auto [more, wider] = cost({common, 0, -common}, bullets);
-      CHECK(more <= searches + 2);
-      CHECK(wider <= pairs + pairs / 10);
+  for (const Domain<double>& domain : {Domain<double>::open(), Domain<double>::periodic({5, 5, 5})}) {
+    for (const bool bullets : {false, true}) {
+      const auto [searches, pairs] = cost(domain, {0, 0, 0}, bullets);
+      CHECK(searches < 20);
+      for (const double common : {0.01, 0.3, 20.0, 1e5}) {
+        CAPTURE(domain.isOpen(), bullets, common);
+        const auto [more, wider] = cost(domain, {common, 0, -common}, bullets);
+        CHECK(more <= searches + 2);
+        CHECK(wider <= pairs + pairs / 10);
+      }
     }
   }
 }

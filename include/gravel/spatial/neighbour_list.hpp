@@ -14,12 +14,10 @@ namespace gravel {
 /// always a superset of what a fresh search would give, so that the skin has no say in any result.
 ///
 /// In a shear-periodic box ways are measured against the flow -(3/2) Omega x, in whose frame the images stand
-/// still, and what the flow itself can bring a touching pair nearer is taken off the skin.
-///
-/// A list can be asked to hold for a whole step, along straight ways whose ends are known. A few bodies that
-/// leave their half of the skin, bullets among grains, do not spoil it: each of them is compared with all
-/// others, until a new search is cheaper. Nor does in an open domain what most have in common, a pile in
-/// orbit.
+/// still, and what the flow itself can bring a touching pair nearer is taken off the skin. A list can be
+/// asked to hold for a whole step, along straight ways whose ends are known. A few bodies that leave their
+/// half of the skin, bullets among grains, do not spoil it: each of them is compared with all others, until a
+/// new search is cheaper. Nor does, without shear, what most have in common: a pile in orbit.
 template <Real S>
 class NeighbourList {
  public:
@@ -145,13 +143,16 @@ class NeighbourList {
       return margin > S(0) ? "the margin grew or the flow used up the skin" : "the flow used up the skin";
     }
     const std::size_t n = places_.size();
+    const Vector3<S> last = domain.isOpen() ? Vector3<S>(Vector3<S>::Zero()) : common_.end();
     common_.clear();
     setHalf();
     const char* reason = whoMoved(positions, radii, travel);
-    if (reason != tooFar || !domain.isOpen()) {
+    if (reason != tooFar || !(domain.omega() == S(0))) {
       return reason;
     }
-    const auto moved = [&](std::size_t i) { return Vector3<S>(Vector3<S>(positions[i]) - places_[i]); };
+    const auto moved = [&](std::size_t i) {  // in a box by the image nearest to where all went last
+      return Vector3<S>(last + domain.minimumImage(Vector3<S>(positions[i]) - places_[i] - last, time));
+    };
     const auto moves = [&](std::size_t i) { return Vector3<S>(moved(i) + detail::wayOf<S>(travel, i)); };
     common_.set(detail::commonWay<S>(n, moved), detail::commonWay<S>(n, moves));
     setHalf();
@@ -194,11 +195,10 @@ class NeighbourList {
 
   /// From where the last search saw body i to where it is on this way from x, less what all have in common.
   [[gnu::always_inline]] S farthest_sq(std::size_t i, const Vector3<S>& x, const Vector3<S>& way) const {
-    Vector3<S> start = x - places_[i];
+    Vector3<S> start = x - places_[i] - common_.start();
     Vector3<S> end;
     if (domain_.isOpen()) {
       end = Vector3<S>(x + way) - places_[i] - common_.end();
-      start -= common_.start();
     } else {
       start[1] += flow_ * x[0];
       start = domain_.minimumImage(start, time_);
@@ -255,7 +255,7 @@ class NeighbourList {
     flow_ = S(0);
     common_.clear();
     if constexpr (!std::is_same_v<Travel, AtRest>) {
-      if (domain.isOpen()) {
+      if (domain.omega() == S(0)) {
         common_.set(Vector3<S>::Zero(), detail::commonWay<S>(n, travel));
       }
       skin_ = std::max<S>(
