@@ -331,7 +331,7 @@ std::vector<char> altered(std::vector<char> bytes, const std::string& name, std:
 }  // namespace
 
 // Seen to fail: numbers, reals or materials taken up as they come, which makes the next steps throw; planes
-// in any order.
+// in any order, or with any normal.
 TEST_CASE("Values that cannot be are refused by name where a file's checksum is right") {
   const TemporaryFile file("values");
   Space<double> saved(plain(5e-3));
@@ -364,6 +364,8 @@ TEST_CASE("Values that cannot be are refused by name where a file's checksum is 
        {"acceleration", "angularVelocity", "planes", "contacts", "impulses", "solved bodies"}) {
     refuses(name, nan, std::string("a value of '") + name + "' that is not finite");
   }
+  refuses("planes", 0.5, "a plane whose normal is no unit vector");
+  refuses("contacts", 0.5, "a contact whose normal is no unit vector");
   refuses("numbers of planes", std::uint64_t{77}, "planes that are not in the order of their numbers");
   refuses("material", std::uint32_t{77}, "material of body 0 is 77; allowed: 0");
   refuses("materials", -1.0, "restitution of material 0 is -1");
