@@ -12,7 +12,7 @@ using Vec = Vector3<double>;
 /// Bodies and contacts between them, with an acceleration each.
 struct Heap {
   Bodies<double> bodies;
-  std::vector<Contact<double>> contacts;
+  ContactList<double> contacts{{}, {{.material = {.staticFriction = 0.4}}}};
 
   void add(const Vec& x, const Vec& a, double radius, double mass, bool fixed = false) {
     Body<double> body;
@@ -27,7 +27,7 @@ struct Heap {
     Contact<double> c{};
     c.first = static_cast<std::uint32_t>(i);
     c.second = static_cast<std::uint32_t>(j);
-    contacts.push_back(c);
+    contacts.contacts.push_back(c);
   }
   double longest() const { return PileStep<double>{}.longest(bodies, contacts); }
 };
@@ -60,6 +60,25 @@ TEST_CASE("A ball of grains asks for a tenth of the root of d/g, with g at its s
   const double d = 0.5;
   const double g = 7.0;
   CHECK_THAT(ball(4.0, d, g, Vec::Zero()).longest(), WithinRel(0.1 * std::sqrt(d / g), 0.01));
+}
+
+// Of two materials the mean over contacts counts: half of them smooth asks for 0.08. Without friction such
+// piles boil in the longer steps (laws/test_pile.cpp). Seen to fail: 0.1 for all; kinetic friction not seen.
+TEST_CASE("Smooth grains ask for six tenths of the step, those of a coefficient of 0.02 for all of it") {
+  const auto share = [](double mu_s, double mu_k, bool half = false) {
+    Heap heap = ball(2.0, 0.5, 7.0, Vec::Zero());
+    const double rough = heap.longest();
+    heap.contacts.surfaces.push_back({.material = {.staticFriction = mu_s, .kineticFriction = mu_k}});
+    for (std::size_t k = half ? 1 : 0; k < heap.contacts.size(); k += half ? 2 : 1) {
+      heap.contacts[k].surface = 1;
+    }
+    return heap.longest() / rough;
+  };
+  CHECK_THAT(share(0, 0), WithinRel(0.6, 1e-14));
+  CHECK_THAT(share(0.01, 0), WithinRel(0.8, 1e-14));
+  CHECK_THAT(share(0, 0.01), WithinRel(0.8, 1e-14));
+  CHECK_THAT(share(0.02, 0.01), WithinRel(1.0, 1e-14));
+  CHECK_THAT(share(0, 0, true), WithinRel(0.8, 1e-14));
 }
 
 // Seen to fail: accelerations in the axes of space, or relative to the centre of mass of all bodies.
@@ -107,7 +126,7 @@ TEST_CASE("A pebble on a planet asks for nothing that the planet would notice") 
 
 TEST_CASE("Accelerations beyond a scalar's range ask for nothing, rather than for no time at all") {
   Bodies<float> bodies;
-  std::vector<Contact<float>> contacts(1);
+  ContactList<float> contacts{std::vector<Contact<float>>(1), {{}}};
   for (int k = 0; k < 2; ++k) {
     Body<float> body;
     body.position = {static_cast<float>(k), 0, 0};

@@ -91,6 +91,31 @@ TEST_CASE(
   }
 }
 
+// Nothing but restitution takes the motion of smooth grains, which boil in steps of 0.1 sqrt(d/g), here
+// 0.069, that those with friction rest in. Seen to fail: that limit for smooth grains, too (rms speed 0.060,
+// residual 0.025).
+TEST_CASE("A smooth pile that its own gravity holds comes to rest, however long steps may be by pairs") {
+  SimulationConfig<double> config = plain(0.4);
+  config.adaptiveTimeStep = true;
+  config.timeStepFactor = 0.1;
+  config.G = 1.0;
+  Space<double> space(config);
+  const CounterRandom random(2);
+  for (int i = 0; i < 512; ++i) {
+    const Vec x = 2.7 * Vec(i % 8 - 3.5, i / 8 % 8 - 3.5, i / 64 - 3.5);
+    if (x.norm() < 2.7 * 3.7) {
+      const double r = random.uniform(static_cast<std::uint64_t>(i), 0.7, 1.3);
+      space.addBody(ball(x, {0, 0, 0}, r, r * r * r));
+    }
+  }
+  space.advanceTo(70.0);
+  const ContactVirial<double> virial = space.contactVirial();
+  CAPTURE(space.steps(), space.getPreviousTimeStep(), virial.residual());
+  const double escape = -2 * std::get<2>(space.calculateSystemEnergy());  // its square times mass
+  CHECK(virial.motion < 1e-7 * escape);
+  CHECK(virial.residual() < 1e-3);
+}
+
 TEST_CASE("A floor carries the weight of the heap upon it, whatever the heap is doing inside") {
   SimulationConfig<double> config = plain(1e-3);
   config.coeffFriction = 0.4;

@@ -226,8 +226,8 @@ void Space<Scalar, Layout>::updateAdaptiveTimeStep() {
   if (pulls) {
     wanted =
         std::min<Scalar>(wanted, stepFromEncounters(bodies_, getG(), c.softening, limits, contact_.domain));
-    wanted = std::clamp<Scalar>(limits.contactSteps * piles_.longest(bodies_, contacts().contacts),
-                                limits.smallest, wanted);
+    wanted = std::clamp<Scalar>(limits.contactSteps * piles_.longest(bodies_, contacts()), limits.smallest,
+                                wanted);
   }
   // A blow, or a change from outside, ends one smooth motion and begins another.
   dt_ =

@@ -91,8 +91,7 @@ std::size_t Space<Scalar, Layout>::chooseParts(const Scalar& h) {
     rate_sq = std::max<Scalar>(rate_sq, v.squaredNorm() / (r * r));
     rate_sq = std::max<Scalar>(rate_sq, Scalar(2) * Scalar(sqrt(a.squaredNorm())) / r);
   }
-  const Scalar rests =
-      getG() == Scalar(0) ? Scalar(0) : Scalar(h / piles_.longest(bodies_, contacts().contacts));
+  const Scalar rests = getG() == Scalar(0) ? Scalar(0) : Scalar(h / piles_.longest(bodies_, contacts()));
   const Scalar wanted = std::max<Scalar>(Scalar(4) * h * Scalar(sqrt(rate_sq)), rests);
   std::size_t parts = 1;
   while (parts < mostChosenSubsteps && Scalar(static_cast<double>(parts)) < wanted) {
