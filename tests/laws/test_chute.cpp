@@ -108,9 +108,9 @@ ChuteFlow chute(double degrees, double atTop, double timeStep, double until, std
 // 0.30) it differs by 0.02 here, and four standard deviations of five seeds (I = 0.160, sd 0.008) are 0.013
 // of it: bound at 0.035. Filling by Silbert et al. (2001, Phys. Rev. E 64, 051302): 0.59 at 22 and 0.58 at 24
 // degrees, 0.01 less for two more; five seeds 0.565, sd 0.004. Spins are half of the shear; five seeds 0.476,
-// sd 0.019. Seen to fail: steps of 0.2 sqrt(d/g) (filling 0.606); no friction (0.591, no spin, I = 0.249);
-// friction of 0.2, by which grains still creep at 18 degrees (0.036). Deeper flows and steps:
-// docs/theory-time-step.md.
+// sd 0.019. Seen to fail: steps of 0.2 sqrt(d/g) (filling 0.606). Outside by measurement: no friction
+// (filling 0.591, no spin, I = 0.249); friction of 0.2, by which grains still creep at 18 degrees (0.036).
+// Deeper flows and steps: docs/theory-time-step.md.
 TEST_CASE("Grains flow down a rough chute by mu(I) at 26 degrees, and stop at 18") {
   const ChuteFlow steep = chute(26.0, 3.0, 0.02, 30.0, 1);
   CAPTURE(steep.speed, steep.filling, steep.inertial, steep.spin, steep.moved);

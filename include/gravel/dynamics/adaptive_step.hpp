@@ -30,6 +30,30 @@ struct StepLimits {
   Scalar contactSteps = Scalar(1);  ///< contact steps in one step: only these must be short against radii
 };
 
+namespace detail {
+
+/// What steps leave out of speeds: the flow of a sheared domain, unless a body stands still.
+template <Real Scalar>
+struct FlowLeftOut {
+  Domain<Scalar> domain;      ///< whose flow that is; open for none
+  Scalar across = Scalar(0);  ///< [m s^-1] by which it lets the largest sphere meet others at most
+
+  /// O(N) in a sheared domain, else O(1).
+  template <class Layout>
+  static FlowLeftOut of(const Bodies<Scalar, Layout>& bodies, const Domain<Scalar>& domain) {
+    Scalar largest(0);
+    for (std::size_t i = 0; i < bodies.size() && !(domain.omega() == Scalar(0)); ++i) {
+      if (bodies[i].isFixed()) {
+        return {};
+      }
+      largest = std::max<Scalar>(largest, bodies.radii()[i]);
+    }
+    return {domain, domain.shearRate() * largest};
+  }
+};
+
+}  // namespace detail
+
 /// The step by the rules above over the movable bodies, within the limits. O(N).
 /// \param anchored something outside the bodies stands still, such as a plane
 template <Real Scalar, class Layout>
@@ -47,19 +71,17 @@ Scalar stepFromMotion(const Bodies<Scalar, Layout>& bodies, const Scalar& soften
   Vector3<Scalar> a_cm = Vector3<Scalar>::Zero();
   Vector3<Scalar> low = bodies[0].position();
   Vector3<Scalar> high = low;
-  Scalar largest(0);
+  const auto flow = detail::FlowLeftOut<Scalar>::of(bodies, anchored ? Domain<Scalar>::open() : domain);
   for (std::size_t i = 0; i < n; ++i) {
     const auto body = bodies[i];
     const Scalar m = body.mass();
     mass += m;
-    v_cm += domain.lessFlow(body.position(), body.velocity()) * m;
+    v_cm += flow.domain.lessFlow(body.position(), body.velocity()) * m;
     a_cm += body.acceleration() * m;
     low = low.cwiseMin(Vector3<Scalar>(body.position()));
     high = high.cwiseMax(Vector3<Scalar>(body.position()));
-    largest = std::max<Scalar>(largest, body.radius());
     anchored = anchored || body.isFixed();
   }
-  const Domain<Scalar> moves = anchored ? Domain<Scalar>::open() : domain;
   const Scalar share = anchored || !(mass > Scalar(0)) ? Scalar(0) : Scalar(Scalar(1) / mass);
   v_cm *= share;
   a_cm *= share;
@@ -76,11 +98,11 @@ Scalar stepFromMotion(const Bodies<Scalar, Layout>& bodies, const Scalar& soften
     const Scalar l = std::max<Scalar>(r, floor);
     const Scalar a = Vector3<Scalar>(body.acceleration() - a_cm).norm();
     const Scalar v_sq =
-        Vector3<Scalar>(moves.lessFlow(body.position(), body.velocity()) - v_cm).squaredNorm();
+        Vector3<Scalar>(flow.domain.lessFlow(body.position(), body.velocity()) - v_cm).squaredNorm();
     if (a > Scalar(0) && l > Scalar(0)) {
       tau = std::min<Scalar>(tau, sqrt(v_sq + a * l) / a);
     }
-    const Scalar v = (v_sq > Scalar(0) ? Scalar(sqrt(v_sq)) : Scalar(0)) + moves.shearRate() * largest;
+    const Scalar v = (v_sq > Scalar(0) ? Scalar(sqrt(v_sq)) : Scalar(0)) + flow.across;
     if (r > Scalar(0) && v > Scalar(0)) {
       tau = std::min<Scalar>(tau, limits.contactSteps * r / (Scalar(4) * limits.factor * v));
     }

@@ -106,15 +106,9 @@ void lookAtLikeliest(const Bodies<Scalar, Layout>& bodies, const Domain<Scalar>&
                      const S& softening, const S& T, S& sum, S& approach) {
   using std::sqrt;
   const std::size_t n = bodies.size();
-  S largest(0);
-  bool anchored = false;
-  for (std::size_t i = 0; i < n; ++i) {
-    largest = std::max<S>(largest, S(bodies.radii()[i]));
-    anchored = anchored || bodies[i].isFixed();
-  }
-  const Domain<Scalar> moves = anchored ? Domain<Scalar>::open() : domain;
+  const auto flow = FlowLeftOut<Scalar>::of(bodies, domain);
   const auto lessFlow = [&](std::size_t i, const Vector3<Scalar>& v) {
-    return Vector3<S>(moves.lessFlow(bodies[i].position(), v).template cast<S>());
+    return Vector3<S>(flow.domain.lessFlow(bodies[i].position(), v).template cast<S>());
   };
   S mass(0);
   Vector3<S> v_cm = Vector3<S>::Zero();
@@ -132,7 +126,7 @@ void lookAtLikeliest(const Bodies<Scalar, Layout>& bodies, const Domain<Scalar>&
   const auto speedSq = [&](std::size_t i) {
     return S(Vector3<S>(lessFlow(i, bodies.velocities()[i]) - v_cm).squaredNorm() * T * T);
   };
-  const S sheared = S(moves.shearRate()) * T * largest;
+  const S sheared = S(flow.across) * T;
   const S Gm = G * mass / S(static_cast<double>(n)) * T * T;
   sum = -orderedMin(n, 2048, S(0), [&](std::size_t i) {
     const auto body = bodies[i];
