@@ -249,9 +249,9 @@ class ImpactEvents : private detail::ImpactCourses<S> {
       const S fall = scene.heldAlong(event.first, event.second, n);
       threshold = std::max<S>(threshold, fall * h);
     }
-    const bool bounces =
-        !bouncesNoMore(scene, event.first) && (boundary || !bouncesNoMore(scene, event.second));
-    const S e = bounces && speed > threshold ? restitutionAt(material, speed) : S(0);
+    const bool bounces = speed > threshold && !bouncesNoMore(scene, event.first) &&
+                         (boundary || !bouncesNoMore(scene, event.second));
+    const S e = bounces ? restitutionAt(material, speed) : S(0);
     if constexpr (!std::is_same_v<Decide, NoDecision>) {
       if (!boundary && speed > threshold &&
           isDecidedBy(decide, scene, event, *at, v_rel, speed, noise, report)) {
@@ -271,7 +271,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     Vector3<S> dv_t = Vector3<S>::Zero();
     if (material.staticFriction > S(0) && dv_n > S(0)) {
       dv_t = tangentialImpulse<S>(S(1) / mobility, slip, dv_n, material.staticFriction,
-                                  material.kineticFriction, e > S(0) ? material.tangentialRestitution : S(0));
+                                  material.kineticFriction, bounces ? material.tangentialRestitution : S(0));
     }
     // In two strokes, stop and rebound: a head-on blow then ends at exactly e times its speed.
     const std::array<Vector3<S>, 3> strokes{S(-v_n) * n, target * n, dv_t};
