@@ -4,6 +4,7 @@
 #include <numeric>
 
 using gravel::detail::clearSpare;
+using gravel::detail::giveBack;
 using gravel::detail::resizeAnew;
 using gravel::detail::resizeSparingly;
 
@@ -38,4 +39,13 @@ TEST_CASE("a workspace of which little was used is given back, and another one k
   CHECK(v == std::vector<int>(10));
   resizeAnew(v, 5);
   CHECK(v.size() == 5);
+}
+
+TEST_CASE("what one part of a step fills is left to the others, unless it is little") {
+  std::vector<int> many(100000);
+  giveBack(many);
+  CHECK(many.capacity() == 0);
+  std::vector<int> few(100);
+  giveBack(few);
+  CHECK(few.capacity() >= 100);
 }

@@ -36,6 +36,9 @@ class ContactEnergy {
     if (problem.isScaled()) {
       scaleOut(problem);
     }
+    detail::giveBack(terms_);
+    detail::giveBack(gains_);
+    detail::giveBack(islands_);
     report.restitutionLoss = problem.energyOut(sums[0]);
     report.frictionLoss = problem.energyOut(sums[1]);
     report.driftWork = problem.energyOut(sums[2]);

@@ -115,6 +115,7 @@ class ContactSolver {
         problem_.scatter(bodies, coloring_);
         goesOn_ = true;
       }
+      detail::giveBack(problem_.slipTargets);
     }
     if (!goesOn_) {
       rowImpulses_.clear(contacts.size());
@@ -165,15 +166,15 @@ class ContactSolver {
   template <class Change>
   Eigen::Array<S, 2, 1> workOn(Change&& dv) {
     using Sums = Eigen::Array<S, 2, 1>;
-    detail::resizeAnew(changes_, coloring_.bodies().size() + 1);
-    changes_.back() = Vector3<S>::Zero();
+    std::vector<Vector3<S>> changes(coloring_.bodies().size() + 1);  // by slot
+    changes.back() = Vector3<S>::Zero();
     parallelFor(coloring_.bodies().size(), chunk,
-                [&](std::size_t slot) { changes_[slot] = dv(coloring_.bodies()[slot]); });
+                [&](std::size_t slot) { changes[slot] = dv(coloring_.bodies()[slot]); });
     return detail::sumOverAllParts(
         coloring_, Sums(Sums::Zero()), [&](std::size_t begin, std::size_t end, Sums& sums) {
           for (std::size_t r = begin; r < end; ++r) {
             const ContactColoring::Row& place = coloring_.rows()[r];
-            const Vector3<S> change = changes_[place.slot2] - changes_[place.slot1];
+            const Vector3<S> change = changes[place.slot2] - changes[place.slot1];
             // None between two that fall alike: their row is not fetched. A user's scalar may
             // be more than its value, a derivative say.
             const bool any = !std::is_floating_point_v<S> || change != Vector3<S>::Zero();
@@ -302,7 +303,6 @@ class ContactSolver {
   std::vector<detail::EndedContact<S>> ended_;
   /// Of the solve before, whose contacts have other names unless `sameNames_`.
   detail::EarlierImpulses<S> before_;
-  std::vector<Vector3<S>> changes_;  ///< by slot: of workOn()
   S memoryStep_ = S(0);
   bool handedOn_ = false;   ///< no solve() since
   bool kept_ = false;       ///< the last solve() left all but lone rows with the impulses of the one before

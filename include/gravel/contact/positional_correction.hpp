@@ -84,7 +84,7 @@ class PositionalCorrection {
   CorrectionReport<S> apply(std::span<const Contact<S>> contacts, const ContactColoring& colouring, B& bodies,
                             const CorrectionSettings<S>& settings, const ContactFacts<S>& facts) {
     validate(settings);
-    moved_.clear();
+    detail::clearSpare(moved_);
     CorrectionReport<S> report;
     report.largestOverlap = facts.overlap;
     const S right = contacts.empty() ? S(0) : S(settings.precision * facts.radius);
@@ -126,6 +126,9 @@ class PositionalCorrection {
       }
     } while (report.residual > enough && falls && report.iterations < settings.maxIterations);
     move(colouring, bodies);
+    detail::giveBack(shifts_);
+    detail::giveBack(deep_);
+    watch_.end();
     return report;
   }
 
@@ -177,7 +180,6 @@ class PositionalCorrection {
       }
     });
     std::partial_sum(ends_.begin(), ends_.end(), ends_.begin());
-    detail::clearSpare(moved_);
     detail::resizeAnew(moved_, ends_.back());
     parallelForChunks<Share::Alike>(n, chunk, [&](std::size_t begin, std::size_t end) {
       std::size_t place = begin == 0 ? 0 : ends_[begin / chunk - 1];

@@ -28,6 +28,12 @@ class RowWatch {
     resizeSparingly(then_, rows);
     holds_ = false;
   }
+  /// Forgets all of it.
+  void end() {
+    holds_ = false;
+    giveBack(ways_);
+    giveBack(then_);
+  }
   /// Goes on with other rows being right enough.
   void goOn(const S& still) { still_ = still; }
 

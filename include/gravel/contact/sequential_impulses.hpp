@@ -106,6 +106,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       const bool more = !last && (ends || half) && problem.letSlide(colouring, lasts);
       if (last || (ends && !more)) {
         problem.watch.setHolds(watched && ends);
+        momentum_.end();
         return report;
       }
       local = local || (report.iterations == 1 && now.changed < count / few);

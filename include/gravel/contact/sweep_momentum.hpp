@@ -39,6 +39,13 @@ class SweepMomentum {
     });
   }
 
+  /// They are of no use any more.
+  void end() {
+    giveBack(steps_);
+    giveBack(turns_);
+    giveBack(swept_);
+  }
+
   /// Velocities follow the impulses beyond their last step, by this share: they are linear in the impulses.
   void coast(ContactProblem<S>& problem, const S& beta) {
     parallelFor(problem.bodies.size(), chunk, [&](std::size_t slot) {

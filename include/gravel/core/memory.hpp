@@ -33,12 +33,22 @@ void resizeAnew(std::vector<T>& v, std::size_t n) {
   resizeSparingly(v, n);
 }
 
+/// Room for so many is kept where it is not needed.
+inline constexpr std::size_t fewEntries = 1024;
+
+/// Leaves the room of what one part of a step fills, and no later one reads, to others, unless it is little.
+template <class T>
+void giveBack(std::vector<T>& v) {
+  if (v.capacity() > fewEntries) {
+    release(v);
+  }
+}
+
 /// v.clear() that gives back room of which the last use filled less than a quarter: a heap that fell has
 /// blows by the thousand in a step, and none once it rests.
 template <class T>
 void clearSpare(std::vector<T>& v) {
-  constexpr std::size_t harmless = 1024;
-  if (v.capacity() > 4 * v.size() + harmless) {
+  if (v.capacity() > 4 * v.size() + fewEntries) {
     release(v);
   } else {
     v.clear();
