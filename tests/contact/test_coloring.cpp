@@ -322,8 +322,8 @@ TEST_CASE("colours, and the order within one, are those of one walk along a list
     CHECK(coloring.loneCount() == groups.front().size());
     CHECK(coloring.begin(coloring.colours()) == contacts.size() - groups.back().size());
     for (const ContactColoring::Row& row : coloring.rows()) {
-      const ContactColoring::Row& other = coloring.rowsByContact()[row.contact];
-      same = same && other.slot1 == row.slot1 && other.slot2 == row.slot2 && other.contact == row.contact;
+      const Contact<double>& c = contacts[row.contact];
+      same = same && row.slot1 == coloring.slotOf(c.first) && row.slot2 == coloring.slotOf(c.second);
     }
     CHECK(same);
     checkParts(coloring);

@@ -26,8 +26,8 @@ namespace gravel {
 /// exact after one blow. Of more bodies than caches hold, contacts within a block of bodies whose ids follow
 /// each other come block by block, and in each colour by colour, before the contacts between blocks: bodies
 /// are fetched once in place of once a colour, and blocks are solved at once.
-/// Keeps most of its workspace; O(contacts), with a sort of those bodies that are first in no contact, and
-/// O(bodies) once for the largest number of them.
+/// O(contacts), with a sort of those bodies that are first in no contact, and O(bodies) once for the largest
+/// number of them.
 class ContactColoring {
  public:
   static constexpr std::size_t maxColours = 62;
@@ -49,6 +49,10 @@ class ContactColoring {
     number(bodies);
     choose();
     arrange();
+    detail::giveBack(byContact_);
+    detail::giveBack(degree_);
+    detail::giveBack(group_);
+    detail::giveBack(used_);
   }
 
   /// Rows [begin, end).
@@ -67,8 +71,6 @@ class ContactColoring {
     return std::span<const Part>(inner_).subspan(first, ends_[block] - first);
   }
   std::size_t colours() const { return start_.size() - 2; }
-  /// The same rows in the order of contacts.
-  std::span<const Row> rowsByContact() const { return byContact_; }
   /// Rows [begin, end) of a colour but those within blocks; the colour `colours()` is the overflow.
   std::size_t begin(std::size_t colour) const { return start_[colour]; }
   std::size_t end(std::size_t colour) const { return start_[colour + 1]; }
@@ -273,7 +275,6 @@ class ContactColoring {
   }
 
   std::vector<Row> rows_;
-  std::vector<Row> byContact_;
   std::vector<Part> parts_;
   bool shared_ = false;  ///< any group is shared between threads
   using Places = std::array<std::size_t, 2 * maxColours + 2>;
@@ -285,8 +286,10 @@ class ContactColoring {
   std::vector<std::size_t> start_{0, 0};
   std::vector<std::uint32_t> bodyOfSlot_;
   std::vector<std::uint32_t> slotOfBody_;
-  std::vector<std::uint32_t> degree_;
   std::vector<std::uint8_t> movable_;
+  // While it is built:
+  std::vector<Row> byContact_;
+  std::vector<std::uint32_t> degree_;
   std::vector<std::uint8_t> group_;
   std::vector<std::uint64_t> used_;
 };

@@ -64,7 +64,7 @@ class ContactSolver {
         before_.findEnded(contacts.contacts, problem_.rows, bodies, ended_);
       }
       coloring_.build(contacts.contacts, bodies);
-      islands_.find(coloring_);
+      islands_.find(contacts.contacts, coloring_);
       before_.handOn(contacts.contacts, coloring_.rows(), names_, rowImpulses_);
       handedOn_ = true;
       otherRows_ = true;

@@ -12,13 +12,16 @@ namespace gravel::detail {
 /// though in a heap at rest some always come to push and others cease. What does not move joins nobody.
 class SolverIslands {
  public:
-  /// O(bodies + contacts).
-  void find(const ContactColoring& colouring) {
+  /// O(bodies + contacts). \param contacts  those of the colouring
+  template <Real S>
+  void find(std::span<const Contact<S>> contacts, const ContactColoring& colouring) {
     slots_.begin(colouring.bodies().size() + 1);
     areFree_ = true;
-    for (const ContactColoring::Row& row : colouring.rowsByContact()) {  // neighbours in memory too
-      if (colouring.movable(row.slot1) && colouring.movable(row.slot2)) {
-        slots_.join(row.slot1, row.slot2);
+    for (const Contact<S>& c : contacts) {  // not its rows: neighbours here are so in memory, too
+      const std::uint32_t slot1 = colouring.slotOf(c.first);
+      const std::uint32_t slot2 = colouring.slotOf(c.second);
+      if (colouring.movable(slot1) && colouring.movable(slot2)) {
+        slots_.join(slot1, slot2);
       } else {
         areFree_ = false;
       }
