@@ -54,7 +54,7 @@ class ContactSolver {
     fresh_ = true;
     const bool solved = goesOn_ && inRows_ && problem_.rows.size() == names_.size();
     goesOn_ = false;
-    ended_.clear();
+    detail::clearSpare(ended_);
     const bool asMany = contacts.size() == names_.size() && contacts.size() == coloring_.rows().size();
     // The same pairs of the same bodies: colours, and who is remembered, stay.
     if (!asMany || facts.others > 0 || !sameMovable(bodies)) {
@@ -92,6 +92,7 @@ class ContactSolver {
     const detail::ImpulseList<S>* last = &rowImpulses_;
     if (sameNames_) {
       std::swap(before_.impulses(), rowImpulses_);
+      before_.forgetNames();
       last = &before_.impulses();
     }
     handedOn_ = false;

@@ -62,6 +62,12 @@ class EarlierImpulses {
     }
   }
 
+  /// They are those of the present contacts, whose names are known elsewhere.
+  void forgetNames() {
+    giveBack(names_);
+    giveBack(rowOf_);
+  }
+
   /// In the order of the rows that they were solved in.
   ImpulseList<S>& impulses() { return impulses_; }
   const ImpulseList<S>& impulses() const { return impulses_; }
@@ -100,7 +106,7 @@ class EarlierImpulses {
   void handOn(std::span<const Contact<S>> contacts, std::span<const ContactColoring::Row> rows,
               std::vector<ContactName>& names, ImpulseList<S>& impulses) {
     resizeAnew(names, contacts.size());
-    resizeAnew(origins_, contacts.size());
+    std::vector<std::uint32_t> origins(contacts.size());  // of each contact its row here, or staticPartner
     parallelForChunks<Share::Alike>(contacts.size(), chunk, [&](std::size_t begin, std::size_t end) {
       const auto earlier = [](const ContactName& name, const ContactKeys& keys) { return name.keys < keys; };
       auto old =
@@ -111,12 +117,12 @@ class EarlierImpulses {
           ++old;
         }
         const bool known = old != names_.end() && old->keys == names[k].keys;
-        origins_[k] = known ? rowOf_[static_cast<std::size_t>(old - names_.begin())] : staticPartner;
+        origins[k] = known ? rowOf_[static_cast<std::size_t>(old - names_.begin())] : staticPartner;
       }
     });
     impulses.resize(contacts.size(), impulses_.turns());
     parallelFor(contacts.size(), chunk, [&](std::size_t r) {
-      const std::uint32_t origin = origins_[rows[r].contact];
+      const std::uint32_t origin = origins[rows[r].contact];
       impulses.set(r, origin != staticPartner ? impulses_.get(origin) : ContactImpulse<S>{});
     });
   }
@@ -125,9 +131,8 @@ class EarlierImpulses {
   static constexpr std::size_t chunk = 512;
 
   std::vector<ContactName> names_;
-  ImpulseList<S> impulses_;             ///< in the order of their rows
-  std::vector<std::uint32_t> rowOf_;    ///< by contact, in the order of names
-  std::vector<std::uint32_t> origins_;  ///< by a contact that is handed on to: its row here, or staticPartner
+  ImpulseList<S> impulses_;           ///< in the order of their rows
+  std::vector<std::uint32_t> rowOf_;  ///< by contact, in the order of names
 };
 
 }  // namespace detail
