@@ -5,6 +5,7 @@
 
 #include <gravel/contact/contact_search.hpp>
 #include <gravel/contact/surface_numbers.hpp>
+#include <gravel/core/memory.hpp>
 
 namespace gravel::detail {
 
@@ -46,6 +47,12 @@ class BoundaryContacts {
     if (!std::is_sorted(contacts_.begin(), contacts_.end(), byKeys)) {
       std::sort(contacts_.begin(), contacts_.end(), byKeys);
     }
+  }
+
+  /// They have been taken over.
+  void forget() {
+    giveBack(contacts_);
+    parts_.resize(std::min<std::size_t>(parts_.size(), 1));
   }
 
   /// Sorted by keys.

@@ -15,9 +15,9 @@
 
 namespace gravel {
 
-/// Turns candidate pairs and boundaries into the list of contacts, sorted by keys. Keeps its workspace from
-/// call to call. O(candidates + bodies x boundaries), shared between threads; the list is the same for any
-/// number of threads. A pair of two immovable bodies makes no contact, and neither does a tracer.
+/// Turns candidate pairs and boundaries into the list of contacts, sorted by keys. O(candidates + bodies x
+/// boundaries), shared between threads; the list is the same for any number of threads. A pair of two
+/// immovable bodies makes no contact, and neither does a tracer.
 template <Real S>
 class NarrowPhase {
  public:
@@ -39,11 +39,24 @@ class NarrowPhase {
         spheres_[i] = {bodies.positions()[i], bodies.radii()[i]};
       });
     }
-    const std::size_t used = detail::gatherContacts(
-        pairs.size(), parts_, [&](std::size_t k, std::vector<Pair>& part, Cursor& cursor) {
-          appendPair(pairs[k], bodies, domain, materials, settings, part, cursor);
-        });
-    merge(used, bodies, domain, materials, settings, out);
+    touching_.resize(pairs.size());
+    parts_.resize((pairs.size() + chunk - 1) / chunk);
+    parallelForChunks<Share::Alike>(pairs.size(), chunk, [&](std::size_t begin, std::size_t end) {
+      Part part;
+      Cursor cursor = 0;
+      for (std::size_t k = begin; k < end; ++k) {
+        touching_[k] = touches(pairs[k], bodies, domain, materials, settings, cursor) ? 1 : 0;
+        if (touching_[k] != 0) {
+          ++part.count;
+          part.end = k + 1;
+        }
+      }
+      parts_[begin / chunk] = part;
+    });
+    merge(pairs, bodies, domain, materials, settings, out);
+    detail::giveBack(spheres_);
+    detail::giveBack(touching_);
+    walls_.forget();
   }
 
   /// Of the contacts of the last find().
@@ -61,18 +74,19 @@ class NarrowPhase {
   /// Pairs and boundaries in the order of keys, part by part. The geometry of pairs is found once more: that
   /// is less than to keep it meanwhile.
   template <class B>
-  void merge(std::size_t used, const B& bodies, const Domain<S>& domain, const MaterialView<S>& materials,
-             const NarrowPhaseSettings<S>& settings, ContactList<S>& out) {
+  void merge(std::span<const Pair> pairs, const B& bodies, const Domain<S>& domain,
+             const MaterialView<S>& materials, const NarrowPhaseSettings<S>& settings, ContactList<S>& out) {
+    const std::size_t used = parts_.size();
     const auto before = [](const Contact<S>& wall, const ContactKeys& keys) { return wall.keys() < keys; };
     const std::vector<Contact<S>>& boundaryContacts = walls_.contacts();
     starts_.assign(1, {0, 0});
     for (std::size_t p = 0; p < used; ++p) {
       Start next = starts_.back();
-      if (!parts_[p].empty()) {
+      if (parts_[p].count > 0) {
         const auto end = std::lower_bound(boundaryContacts.begin(), boundaryContacts.end(),
-                                          keysOf(parts_[p].back(), bodies), before);
+                                          keysOf(pairs[parts_[p].end - 1], bodies), before);
         next.wall = static_cast<std::size_t>(end - boundaryContacts.begin());
-        next.place += parts_[p].size() + next.wall - starts_.back().wall;
+        next.place += parts_[p].count + next.wall - starts_.back().wall;
       }
       starts_.push_back(next);
     }
@@ -99,7 +113,11 @@ class NarrowPhase {
       detail::SurfaceNumbers<S>& own = own_[p];
       own.clear();
       std::uint32_t alike = common;  // material of the last two that had the same one
-      for (const Pair& pair : parts_[p]) {
+      for (std::size_t k = p * chunk; k < parts_[p].end; ++k) {
+        if (touching_[k] == 0) {
+          continue;
+        }
+        const Pair pair = pairs[k];
         const auto [i, j] = pair;
         const ContactKeys keys = keysOf(pair, bodies);
         while (wall < starts_[p + 1].wall && before(boundaryContacts[wall], keys)) {
@@ -172,9 +190,9 @@ class NarrowPhase {
   }
 
   template <class B>
-  [[gnu::flatten]] void appendPair(Pair pair, const B& bodies, const Domain<S>& domain,
-                                   const MaterialView<S>& materials, const NarrowPhaseSettings<S>& settings,
-                                   std::vector<Pair>& part, Cursor& cursor) const {
+  [[gnu::flatten]] bool touches(Pair pair, const B& bodies, const Domain<S>& domain,
+                                const MaterialView<S>& materials, const NarrowPhaseSettings<S>& settings,
+                                Cursor& cursor) const {
     const std::uint32_t i = pair.first;
     const std::uint32_t j = pair.second;
     Vector3<S> drift;
@@ -183,7 +201,7 @@ class NarrowPhase {
     const S far = reach + detail::widestMargin(settings, reach);
     const S distance_sq = r_ij.squaredNorm();
     if (distance_sq > far * far) {
-      return;  // the common case, before anything else is loaded
+      return false;  // the common case, before anything else is loaded
     }
     // A root is taken only where rounding could matter.
     const S near = (S(1) - S(16) * Eigen::NumTraits<S>::epsilon()) * (reach + settings.margin);
@@ -194,28 +212,34 @@ class NarrowPhase {
       return S(detail::accelerationOf<S>(bodies, i) + detail::accelerationOf<S>(bodies, j));
     };
     if (!(reach > S(0)) || (!overlaps && !(distance < reach + detail::marginOf(settings, reach, falls)))) {
-      return;
+      return false;
     }
     if (detail::isTracer(bodies, i) || detail::isTracer(bodies, j) ||
         !(detail::isMovable(bodies, i) || detail::isMovable(bodies, j))) {
-      return;
+      return false;
     }
     const auto mayBegin = [&] {
       const Vector3<S> u = detail::velocityOf(bodies, j) - detail::velocityOf(bodies, i) + drift;
       return detail::mayBegin<S>(settings, S(distance - reach), reach, S(-r_ij.dot(u) / distance), falls());
     };
     if (!overlaps && !detail::mayRest(settings, keysOf(pair, bodies), cursor) && !mayBegin()) {
-      return;
+      return false;
     }
     (void)materials[bodies.materials()[i]];  // refused while the list is what it was
     (void)materials[bodies.materials()[j]];
-    part.push_back(pair);
+    return true;
   }
 
   /// Place and radius of a body: in double half a cache line.
   struct alignas(alignof(S) > 32 ? alignof(S) : 32) Sphere {
     Vector3<S> x;
     S r;
+  };
+
+  /// Of the candidates of a chunk those that touch.
+  struct Part {
+    std::size_t count = 0;
+    std::size_t end = 0;  ///< of the last of them; 0 if there are none
   };
 
   /// Where a part begins among the boundaries' contacts and in the list.
@@ -225,7 +249,8 @@ class NarrowPhase {
   };
 
   std::vector<Sphere> spheres_;
-  std::vector<std::vector<Pair>> parts_;
+  std::vector<std::uint8_t> touching_;          ///< by candidate
+  std::vector<Part> parts_;                     ///< by chunk of them
   std::vector<detail::SurfaceNumbers<S>> own_;  ///< by part: of pairs of two materials, and that drift
   detail::SurfaceNumbers<S> allOwn_;            ///< of all parts
   std::vector<std::uint32_t> numbers_;          ///< there, of each of each part's own
