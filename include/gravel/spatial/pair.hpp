@@ -3,6 +3,7 @@
 /// \file
 /// Candidate pairs: their order, and the one test that every search method applies.
 
+#include <gravel/core/memory.hpp>
 #include <gravel/core/parallel.hpp>
 #include <gravel/spatial/domain.hpp>
 
@@ -127,7 +128,7 @@ void joinPairs(const std::vector<std::vector<Pair>>& parts, const std::vector<Sp
     }
   }
   std::partial_sum(start.begin(), start.end(), start.begin());
-  out.resize(total);
+  resizeAnew(out, total);
   std::vector<std::size_t> next(start.begin(), start.end() - 1);
   for (const auto& part : parts) {
     for (const Pair& pair : part) {
