@@ -37,15 +37,14 @@ class ImpactEvents : private detail::ImpactCourses<S> {
   using Base::late_;
   using Base::leans_;
   using Base::letGo;
-  using Base::link;
   using Base::linked_;
   using Base::merges_;
+  using Base::pairsOf_;
   using Base::predictAgain;
   using Base::predictAll;
   using Base::queue_;
   using Base::remember;
   using Base::resistTurn;
-  using Base::start_;
   using Base::struck_;
   using Base::swept_;
   using Base::turns_;
@@ -82,8 +81,8 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     if (!queue_.empty()) {
       Base::prepare(bodies.size(), near.pairs().size(), held);
       flights_.forget(bodies.size());
-      if (linked_ != near.version() || near.version() == 0 || start_.size() != bodies.size() + 1) {
-        link(bodies.size(), near.pairs());
+      if (linked_ != near.version() || near.version() == 0 || pairsOf_.bodies() != bodies.size()) {
+        pairsOf_.find(bodies.size(), near.pairs());
         linked_ = near.version();
       }
     }
@@ -128,6 +127,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
         goOn({event.first});
       }
     }
+    swept_.forget();
     report.impacts = impacts_.size();
     return report;
   }

@@ -7,12 +7,12 @@
 #include <gravel/contact/impact_flights.hpp>
 #include <gravel/contact/impact_past.hpp>
 #include <gravel/contact/impact_scene.hpp>
+#include <gravel/contact/pairs_of_bodies.hpp>
 #include <gravel/contact/resting_gap.hpp>
 #include <gravel/contact/swept_spheres.hpp>
 #include <gravel/core/memory.hpp>
 #include <gravel/core/parallel.hpp>
 
-#include <numeric>
 #include <optional>
 #include <vector>
 
@@ -33,6 +33,7 @@ class ImpactForecast : protected ImpactPast<S> {
     const NoSupport free;
     predictAll(ImpactScene<S, const B, const Course>{bodies, domain, {}, walls, {}, settings, course, free},
                pairs, nearWalls);
+    swept_.forget();
     return !queue_.empty();
   }
 
@@ -71,7 +72,7 @@ class ImpactForecast : protected ImpactPast<S> {
     const std::size_t bodiesFrom = (pairs.size() + chunk - 1) / chunk;
     const std::size_t n = scene.walls.empty() ? 0 : nearWalls ? nearWalls->size() : scene.bodies.size();
     const std::size_t count = bodiesFrom + (n + chunk - 1) / chunk;
-    parts_.resize(std::max(parts_.size(), count));
+    parts_.resize(count);
     swept_.gather(scene, scene.settings.h);
     parallelForTasks<Share::Alike>(count, [&](std::size_t c) {
       parts_[c].clear();
@@ -89,6 +90,7 @@ class ImpactForecast : protected ImpactPast<S> {
     for (std::size_t c = 0; c < count; ++c) {
       queue_.insert(queue_.end(), parts_[c].begin(), parts_[c].end());
     }
+    parts_.resize(std::min<std::size_t>(count, 1));
     std::make_heap(queue_.begin(), queue_.end(), after);
   }
 
@@ -155,32 +157,15 @@ class ImpactForecast : protected ImpactPast<S> {
     }
   }
 
-  /// Pairs of each body, as places in the list.
-  void link(std::size_t n, std::span<const Pair> pairs) {
-    if (pairs.size() > std::numeric_limits<std::uint32_t>::max() / 2) {
-      detail::refuse("number of pairs that may meet", std::to_string(pairs.size()), "below 2^31");
-    }
-    start_.assign(n + 1, 0);
-    for (const Pair& pair : pairs) {
-      ++start_[pair.first];
-      ++start_[pair.second];
-    }
-    std::partial_sum(start_.begin(), start_.end(), start_.begin());
-    ofBody_.resize(2 * pairs.size());
-    for (std::size_t k = pairs.size(); k-- > 0;) {
-      ofBody_[--start_[pairs[k].first]] = static_cast<std::uint32_t>(k);
-      ofBody_[--start_[pairs[k].second]] = static_cast<std::uint32_t>(k);
-    }
-  }
-
   template <class Scene>
   void predictAgain(const Scene& scene, std::span<const Pair> pairs, std::uint32_t body, const S& from) {
     if (isLeftToSolver(scene, body)) {
       return;
     }
-    for (std::uint32_t k = start_[body]; k < start_[body + 1]; ++k) {
-      predict(scene, pairs[ofBody_[k]], from, ofBody_[k]);
-    }
+    pairsOf_.any(body, pairs, [&](std::uint32_t k) {
+      predict(scene, pairs[k], from, k);
+      return false;
+    });
     for (const Pair& pair : late_) {
       if (pair.first == body || pair.second == body) {
         predict(scene, pair, from, Base::noPair);
@@ -261,23 +246,25 @@ class ImpactForecast : protected ImpactPast<S> {
       borne = borne || share > size / S(1000);
       return sizeOf<S>(share) > size / S(1000) && !(u > size * scene.settings.h);
     };
-    for (std::uint32_t k = start_[body]; k < start_[body + 1]; ++k) {
-      const auto& [i, j] = pairs[ofBody_[k]];
-      if (isListed(scene.held, {scene.bodies.ids()[i], scene.bodies.ids()[j]}, ofBody_[k])) {
-        const Flight one = flights_.of(scene, i);
-        const Flight two = flights_.of(scene, j);
-        Vector3<S> drift;
-        const RelativeFlight<S> flight = flightOf(scene, one, two, drift);
-        const Vector3<S> r = flight.place(from);
-        const S reach = one.radius + two.radius;
-        if (!(detail::safeNorm(r) <= reach * (S(1) + detail::restingMargin<S>()))) {
-          continue;  // moved apart by overlaps with others: it bears nothing, and is not in every list
-        }
-        const Vector3<S> n = detail::safeUnit(r);
-        if (holds(body == i ? Vector3<S>(-n) : n, n.dot(flight.velocity(from)))) {
-          return false;
-        }
+    const auto pairHolds = [&](std::uint32_t k) {
+      const auto& [i, j] = pairs[k];
+      if (!isListed(scene.held, {scene.bodies.ids()[i], scene.bodies.ids()[j]}, k)) {
+        return false;
       }
+      const Flight one = flights_.of(scene, i);
+      const Flight two = flights_.of(scene, j);
+      Vector3<S> drift;
+      const RelativeFlight<S> flight = flightOf(scene, one, two, drift);
+      const Vector3<S> r = flight.place(from);
+      const S reach = one.radius + two.radius;
+      if (!(detail::safeNorm(r) <= reach * (S(1) + detail::restingMargin<S>()))) {
+        return false;  // moved apart by overlaps with others: it bears nothing, and is not in every list
+      }
+      const Vector3<S> n = detail::safeUnit(r);
+      return holds(body == i ? Vector3<S>(-n) : n, n.dot(flight.velocity(from)));
+    };
+    if (pairsOf_.any(body, pairs, pairHolds)) {
+      return false;
     }
     for (const HalfSpace<S>& wall : scene.walls) {
       if (isListed(scene.held, {scene.bodies.ids()[body], boundaryKey(wall.number)}) &&
@@ -312,8 +299,7 @@ class ImpactForecast : protected ImpactPast<S> {
   ImpactFlights<S> flights_;
   std::vector<std::vector<Event>> parts_;
   std::uint64_t linked_ = 0;
-  std::vector<std::uint32_t> start_;
-  std::vector<std::uint32_t> ofBody_;
+  PairsOfBodies pairsOf_;
   std::vector<Pair> late_;
 };
 

@@ -6,6 +6,7 @@
 #include <gravel/contact/contact.hpp>
 #include <gravel/contact/contact_bodies.hpp>
 #include <gravel/contact/impulses.hpp>
+#include <gravel/core/memory.hpp>
 #include <gravel/core/parallel.hpp>
 #include <gravel/spatial/domain.hpp>
 #include <gravel/spatial/strays.hpp>
@@ -44,6 +45,9 @@ class SweptSpheres {
       wallWays_.push_back(h * sumAbs(wall.velocity));
     }
   }
+
+  /// They are of no use any more.
+  void forget() { giveBack(spheres_); }
 
   /// The course of body i is another one now.
   template <class Scene>
