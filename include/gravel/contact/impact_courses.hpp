@@ -15,7 +15,7 @@ class ImpactCourses : protected ImpactForecast<S> {
   using Base::foresees;
 
  protected:
-  using Base::history_;
+  using Base::histories_;
   using Base::isAnchored;
   using Base::isSetFree;
   using Side = ImpactSide<S>;
@@ -44,8 +44,9 @@ class ImpactCourses : protected ImpactForecast<S> {
                                                              scene.course.workOf(scene.bodies, i, shift));
     scene.bodies.positions()[i] += shift;
     scene.course.push(scene.bodies, i, S(1), {dv, nothing, nothing}, t);
-    history_[i].free = true;
-    ++history_[i].impacts;  // what was foreseen of it is void
+    ImpactHistory<S>& past = histories_.at(i);
+    past.free = true;
+    ++past.impacts;  // what was foreseen of it is void
     return true;
   }
 

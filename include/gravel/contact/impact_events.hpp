@@ -32,7 +32,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
   using Base::flightOf;
   using Base::flights_;
   using Base::give;
-  using Base::history_;
+  using Base::histories_;
   using Base::impacts_;
   using Base::late_;
   using Base::leans_;
@@ -74,8 +74,8 @@ class ImpactEvents : private detail::ImpactCourses<S> {
                           Course&& course = {}, const Decide& decide = {}, const Support& support = {}) {
     using Path = std::remove_reference_t<Course>;
     clear();
-    const detail::ImpactScene<S, B, Path, Support> scene{bodies,   domain, materials, walls,    held,
-                                                         settings, course, support,   &history_};
+    const detail::ImpactScene<S, B, Path, Support> scene{bodies,   domain, materials, walls,      held,
+                                                         settings, course, support,   &histories_};
     predictAll(scene, near.pairs(), nearWalls);
     ImpactReport<S> report;
     if (!queue_.empty()) {
@@ -111,8 +111,8 @@ class ImpactEvents : private detail::ImpactCourses<S> {
       const Event event = queue_.back();
       queue_.pop_back();
       const bool second = event.second != staticPartner;
-      if (history_[event.first].impacts != event.stamp1 ||
-          (second && history_[event.second].impacts != event.stamp2)) {
+      if (histories_.of(event.first).impacts != event.stamp1 ||
+          (second && histories_.of(event.second).impacts != event.stamp2)) {
         continue;
       }
       now = event.t;

@@ -38,7 +38,7 @@ class ImpactForecast : protected ImpactPast<S> {
   }
 
  protected:
-  using Base::history_;
+  using Base::histories_;
   using Base::isDecided;
   using Base::isHeld;
   using Base::isLeftToSolver;
@@ -90,7 +90,7 @@ class ImpactForecast : protected ImpactPast<S> {
     for (std::size_t c = 0; c < count; ++c) {
       queue_.insert(queue_.end(), parts_[c].begin(), parts_[c].end());
     }
-    parts_.resize(std::min<std::size_t>(count, 1));
+    parts_.resize(std::min<std::size_t>(count, 2));
     std::make_heap(queue_.begin(), queue_.end(), after);
   }
 
@@ -224,8 +224,8 @@ class ImpactForecast : protected ImpactPast<S> {
   }
 
   void schedule(Event event) {
-    event.stamp1 = history_[event.first].impacts;
-    event.stamp2 = event.second == staticPartner ? 0 : history_[event.second].impacts;
+    event.stamp1 = histories_.of(event.first).impacts;
+    event.stamp2 = event.second == staticPartner ? 0 : histories_.of(event.second).impacts;
     queue_.push_back(event);
     std::push_heap(queue_.begin(), queue_.end(), after);
   }
@@ -285,7 +285,7 @@ class ImpactForecast : protected ImpactPast<S> {
                 const S& u, const Vector3<S>& n) const {
     const auto isOften = [&](std::uint32_t k) {
       return k != staticPartner && isMovable(scene.bodies, k) &&
-             history_[k].impacts >= scene.settings.mostSlow;
+             histories_.of(k).impacts >= scene.settings.mostSlow;
     };
     if (!(gap <= reach / S(1000) && u > scene.settings.restitutionThreshold)) {
       return false;

@@ -4,7 +4,7 @@
 /// What each body has been through in a step, by the impacts that were dealt in it.
 
 #include <gravel/contact/contact_islands.hpp>
-#include <gravel/contact/impact.hpp>
+#include <gravel/contact/impact_histories.hpp>
 #include <gravel/core/memory.hpp>
 
 #include <limits>
@@ -17,18 +17,13 @@ namespace gravel::detail {
 template <Real S>
 class ImpactPast {
  protected:
-  using History = ImpactHistory<S>;
-
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
   static constexpr std::size_t noPair = std::numeric_limits<std::size_t>::max();
   enum class Listed : unsigned char { Unknown, No, Yes };
 
   /// A new step: nothing has happened.
   void forget() {
-    for (const std::uint32_t i : touched_) {
-      history_[i] = History{};
-    }
-    touched_.clear();
+    histories_.forget();
     struck_.clear();
     islandsKnown_ = false;
     clearSpare(impacts_);
@@ -38,7 +33,7 @@ class ImpactPast {
 
   /// For the impacts of so many bodies, of which so many pairs may meet.
   void prepare(std::size_t count, std::size_t pairs, std::span<const ContactName> held) {
-    history_.resize(count);
+    histories_.resize(count);
     listed_.assign(pairs, Listed::Unknown);
     leans_.assign(count, 0);
     for (const ContactName& c : held) {
@@ -88,7 +83,7 @@ class ImpactPast {
 
   /// Whether somebody else has decided about the pair in this step, and not that they part.
   bool isDecided(std::uint32_t first, std::uint64_t key2) const {
-    for (std::uint32_t k = history_[first].rests; k != none; k = earlier_[k]) {
+    for (std::uint32_t k = histories_.of(first).rests; k != none; k = earlier_[k]) {
       if (impacts_[k].decided && impacts_[k].key2 == key2) {
         return true;
       }
@@ -98,7 +93,7 @@ class ImpactPast {
 
   /// Brought to rest in this step, or decided so about.
   bool isAtRest(std::uint32_t first, std::uint64_t key2) const {
-    for (std::uint32_t k = history_[first].rests; k != none; k = earlier_[k]) {
+    for (std::uint32_t k = histories_.of(first).rests; k != none; k = earlier_[k]) {
       if (impacts_[k].key2 == key2) {
         return true;
       }
@@ -121,12 +116,12 @@ class ImpactPast {
   /// It does not bounce any more.
   template <class Scene>
   bool bouncesNoMore(const Scene& scene, std::uint32_t body) const {
-    return history_[body].spent >= scene.settings.mostPerBody;
+    return histories_.of(body).spent >= scene.settings.mostPerBody;
   }
   /// It is left to the solver of simultaneous contacts.
   template <class Scene>
   bool isLeftToSolver(const Scene& scene, std::uint32_t body) const {
-    return history_[body].after >= scene.settings.mostAfter;
+    return histories_.of(body).after >= scene.settings.mostAfter;
   }
 
   /// Enters the last impact. \param ends  the two take no notice of each other any more in this step
@@ -134,15 +129,13 @@ class ImpactPast {
   void remember(const Scene& scene, const S& e, ImpactReport<S>& report, bool ends = false) {
     const Impact<S>& impact = impacts_.back();
     const auto enter = [&](std::uint32_t body, std::uint64_t partner) {
-      History& past = history_[body];
+      ImpactHistory<S>& past = histories_.at(body);
       const bool before = bouncesNoMore(scene, body);
       const S least = S(1) / S(512);
       past.after += before ? 1 : 0;
       past.spent += past.impacts > 0 && past.partner == partner ? least : S(S(1) - e + least);
       past.partner = partner;
-      if (past.impacts++ == 0) {
-        touched_.push_back(body);
-      }
+      ++past.impacts;
       report.postponed += bouncesNoMore(scene, body) && !before ? 1U : 0U;
     };
     enter(impact.first, impact.key2);
@@ -152,19 +145,18 @@ class ImpactPast {
     earlier_.push_back(none);
     // Once a pair: balls without restitution may press on each other a hundred times in a step.
     if (ends || (impact.rests && !isAtRest(impact.first, impact.key2))) {
-      earlier_.back() = history_[impact.first].rests;
-      history_[impact.first].rests = static_cast<std::uint32_t>(impacts_.size() - 1);
+      earlier_.back() =
+          std::exchange(histories_.at(impact.first).rests, static_cast<std::uint32_t>(impacts_.size() - 1));
     }
   }
 
-  std::vector<History> history_;
+  ImpactHistories<S> histories_;
   std::vector<unsigned char> leans_;     ///< bodies with a contact that is held
   std::vector<Listed> listed_;           ///< among what is held, by pair
   ContactIslands islands_;               ///< of what is held
   std::vector<unsigned char> anchored_;  ///< by the body that an island is named by
   bool islandsKnown_ = false;
-  std::vector<std::uint32_t> touched_;  ///< bodies with a history
-  std::vector<std::uint32_t> struck_;   ///< by the blows of this moment
+  std::vector<std::uint32_t> struck_;  ///< by the blows of this moment
   std::vector<Impact<S>> impacts_;
   std::vector<std::uint32_t> earlier_;  ///< of an impact that rests: the one before of the same first body
   std::vector<std::pair<std::uint64_t, std::uint64_t>> merges_;

@@ -5,7 +5,7 @@
 
 #include <gravel/contact/contact.hpp>
 #include <gravel/contact/contact_bodies.hpp>
-#include <gravel/contact/impact.hpp>
+#include <gravel/contact/impact_histories.hpp>
 #include <gravel/spatial/domain.hpp>
 
 #include <span>
@@ -31,7 +31,7 @@ struct ImpactScene {
   const ImpactSettings<S>& settings;
   Course& course;
   const Support& support;
-  const std::vector<ImpactHistory<S>>* history = nullptr;
+  const ImpactHistories<S>* histories = nullptr;
 
   /// Mean velocity of the drift, and accelerations; none of what nothing moves.
   Vector3<S> velocity(std::uint32_t i) const {
@@ -47,9 +47,7 @@ struct ImpactScene {
     }
     return Vector3<S>::Zero();
   }
-  bool isFree(std::uint32_t i) const {
-    return history != nullptr && i < history->size() && (*history)[i].free;
-  }
+  bool isFree(std::uint32_t i) const { return histories != nullptr && histories->of(i).free; }
   /// By which a body falls that nothing holds.
   Vector3<S> freeAcceleration(std::uint32_t i) const {
     return isMovable(bodies, i) ? Vector3<S>(course.acceleration(bodies, i)) : Vector3<S>(Vector3<S>::Zero());
