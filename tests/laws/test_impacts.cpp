@@ -434,6 +434,67 @@ TEST_CASE("A pair that was held in an earlier step meets when a blow drives it t
   CHECK(space.body(1).position()[2] >= 2 - 1e-14);
 }
 
+// No forces: every flight is straight, and the step makes no difference. What met without restitution, or
+// touched as the step began, counts as in contact for the rest of the step; not so once it has flown apart.
+// Blows grow rounding by the way over the radius, less than 100 times each. Seen to fail: such pairs flew
+// through each other and through the floor (4.1 between centres in place of 2.05, an overlap of 0.013, a
+// centre 7 below the floor).
+TEST_CASE("A pair that was in contact and has flown apart in a step meets again in it, whatever the step") {
+  const auto placesAfter = [](Space<double>& space, double end) {
+    space.advanceTo(end);
+    std::vector<double> x;
+    for (std::size_t i = 0; i < space.n(); ++i) {
+      const Vec at = space.body(i).position();
+      x.insert(x.end(), at.begin(), at.end());
+    }
+    return x;
+  };
+  SECTION("balls without restitution: a bullet drives one after the other") {
+    const auto run = [&](double h) {
+      SimulationConfig<double> config = plain(h);
+      config.coeffRestitution = 0;
+      Space<double> space(config);
+      const double q = std::sqrt(2.0);
+      space.addBody(ball({-q - 1, q, 0}, {10, 0, 0}, 1, 1));  // meets the next one at 0.1
+      space.addBody(ball({0, 0, 0}, {0, 0, 0}, 1, 1000));
+      space.addBody(ball({-0.55, -10, 0}, {0, 20, 0}, 1, 10000));  // drives it after the first one at 0.4
+      return placesAfter(space, 1);
+    };
+    CHECK(difference(run(1), run(1.0 / 16)) < 1e-12);
+  }
+  SECTION("balls that touched: walls send one back to the other") {
+    const double overlap = 1e-9;  // what of it is left differs; it grows as rounding does
+    const auto run = [&](double h) {
+      SimulationConfig<double> config = plain(h);
+      config.coeffRestitution = 0.5;
+      Space<double> space(config);
+      const double angle = 0.35;
+      space.addBody(ball({0, 0, 0}, {0, 0, 0}, 1, 1));
+      space.addBody(ball({0, -1.3 + overlap, 0}, {0, 0, 0}, 0.3, 1));
+      space.addBody(ball({-1.1 * std::cos(angle) - 0.1, -1.1 * std::sin(angle), 0}, {20, 0, 0}, 0.1, 1));
+      space.addPlane({0, -1, 0}, -1.1);
+      space.addPlane({-1, 0, 0}, -1.2);
+      return placesAfter(space, 0.2);
+    };
+    CHECK(difference(run(0.2), run(0.2 / 64)) < 1e3 * overlap);
+  }
+  SECTION("a ball on a floor without restitution: thrown up, and back by the ceiling") {
+    SimulationConfig<double> config = plain(1.0);
+    config.coeffRestitution = 0;
+    Space<double> space(config);
+    const MaterialId elastic = space.addMaterial({});
+    space.setPairMaterial(defaultMaterial, elastic,
+                          {.restitution = 1, .staticFriction = 0, .kineticFriction = 0});
+    space.addPlane({0, 0, 1}, 0);
+    space.addPlane({0, 0, -1}, -3, elastic);
+    space.addBody(ball({0, 0, 2}, {0, 0, -10}, 1, 1));       // on the floor at 0.1
+    space.addBody(ball({-7, 0, 0.3}, {30, 0, 0}, 0.1, 10));  // throws it up at 0.2
+    space.computeDynamics(0);
+    CHECK(space.body(0).velocity()[0] > 1);
+    CHECK_THAT(space.body(0).position()[2], WithinAbs(1, 1e-12));
+  }
+}
+
 // Two balls rest on each other by their own gravity; a third strikes one off. Seen to fail: let go without a
 // push back on the other one, the sum of momenta changed by m a (t - h/2), 1.2e-3 here.
 TEST_CASE("A blow that parts a pile in space keeps momentum and the centre of mass") {

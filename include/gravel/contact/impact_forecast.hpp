@@ -179,16 +179,12 @@ class ImpactForecast : protected ImpactPast<S> {
         continue;
       }
       const RelativeFlight<S> flight = flightOf(scene, one, wall);
-      const std::uint64_t key1 = scene.bodies.ids()[body];
-      const std::uint64_t key2 = boundaryKey(scene.walls[w].number);
-      if (isHeld(scene, body, staticPartner, {key1, key2})) {
-        const S gap = wall.normal.dot(flight.place(from)) - one.radius;
-        if (isDriven(scene, body, staticPartner, gap, one.radius, S(-wall.normal.dot(flight.velocity(from))),
-                     wall.normal)) {
-          schedule({from, body, staticPartner, key1, key2, 0, 0, w});
-        }
-      } else if (const auto t = timeOfImpact<S>(flight, wall.normal, one.radius, from)) {
-        schedule({*t, body, staticPartner, key1, key2, 0, 0, w});
+      const ContactKeys keys{scene.bodies.ids()[body], boundaryKey(wall.number)};
+      const S gap = wall.normal.dot(flight.place(from)) - one.radius;
+      const bool flies = isApart(gap, one.radius) || !isHeld(scene, body, staticPartner, keys);
+      if (const auto t = flies ? timeOfImpact<S>(flight, wall.normal, one.radius, from)
+                               : driven(scene, body, staticPartner, flight, wall.normal, from)) {
+        schedule({*t, body, staticPartner, keys.first, keys.second, 0, 0, w});
       }
     }
   }
@@ -202,24 +198,20 @@ class ImpactForecast : protected ImpactPast<S> {
         isLeftToSolver(scene, i) || isLeftToSolver(scene, j) || !detail::canTouch(scene.bodies, i, j)) {
       return;
     }
-    const std::uint64_t key1 = scene.bodies.ids()[i];
-    const std::uint64_t key2 = scene.bodies.ids()[j];
-    if (isDecided(i, key2)) {
+    const ContactKeys keys{scene.bodies.ids()[i], scene.bodies.ids()[j]};
+    if (isDecided(i, keys.second)) {
       return;
     }
     const Flight one = flights_.of(scene, i);
     const Flight two = flights_.of(scene, j);
     const RelativeFlight<S> flight = relativeFlight(one, two, r, drift, scene.settings.h);
     const S reach = one.radius + two.radius;
-    if (isHeld(scene, i, j, {key1, key2}, number)) {
-      const Vector3<S> apart = flight.place(from);
-      const S distance = detail::safeNorm(apart);
-      const Vector3<S> n = detail::safeUnit(apart);
-      if (isDriven(scene, i, j, S(distance - reach), reach, S(-n.dot(flight.velocity(from))), n)) {
-        schedule({from, i, j, key1, key2});
-      }
-    } else if (const auto t = timeOfImpact<S>(flight, reach, from)) {
-      schedule({*t, i, j, key1, key2});
+    const bool held = isHeld(scene, i, j, keys, number);
+    const Vector3<S> at = held ? flight.place(from) : flight.r;
+    const bool flies = !held || isApart(S(detail::safeNorm(at) - reach), reach);
+    if (const auto t = flies ? timeOfImpact<S>(flight, reach, from)
+                             : driven(scene, i, j, flight, detail::safeUnit(at), from)) {
+      schedule({*t, i, j, keys.first, keys.second});
     }
   }
 
@@ -276,22 +268,28 @@ class ImpactForecast : protected ImpactPast<S> {
     return borne;
   }
 
+  /// A held pair that has flown apart since: if it meets again, then at its own time.
+  static bool isApart(const S& gap, const S& reach) { return gap > restingMargin<S>() * reach; }
+
   /// A blow drives a held pair together, faster than what rests picks up in a step: as it is held, so that
   /// what nothing holds along n passes on the slowest blow. Or as it falls freely, once both bodies have had
   /// so many blows in the step that they are in a heap. (Without that a heap of 10 000 that falls deals 47
   /// 000 blows a step, most of them between the same pairs, and comes to rest neither sooner nor better.)
+  /// \param n  along which the flight opens the pair  \return `from`, or nothing
   template <class Scene>
-  bool isDriven(const Scene& scene, std::uint32_t i, std::uint32_t j, const S& gap, const S& reach,
-                const S& u, const Vector3<S>& n) const {
+  std::optional<S> driven(const Scene& scene, std::uint32_t i, std::uint32_t j,
+                          const RelativeFlight<S>& flight, const Vector3<S>& n, const S& from) const {
+    const S u = -n.dot(flight.velocity(from));
     const auto isOften = [&](std::uint32_t k) {
       return k != staticPartner && isMovable(scene.bodies, k) &&
              histories_.of(k).impacts >= scene.settings.mostSlow;
     };
-    if (!(gap <= reach / S(1000) && u > scene.settings.restitutionThreshold)) {
-      return false;
+    if (!(u > scene.settings.restitutionThreshold)) {
+      return std::nullopt;
     }
     const S fall = isOften(i) && isOften(j) ? S(scene.fallOf(i) + scene.fallOf(j)) : scene.heldAlong(i, j, n);
-    return u > fall * scene.settings.h + scene.settings.restitutionThreshold;
+    const bool fast = u > fall * scene.settings.h + scene.settings.restitutionThreshold;
+    return fast ? std::optional<S>(from) : std::nullopt;
   }
 
   std::vector<Event> queue_;
