@@ -48,4 +48,7 @@ TEST_CASE("what one part of a step fills is left to the others, unless it is lit
   std::vector<int> few(100);
   giveBack(few);
   CHECK(few.capacity() >= 100);
+  std::vector<int> mapped(gravel::detail::mappedAnew / sizeof(int));
+  giveBack(mapped);
+  CHECK(mapped.capacity() >= gravel::detail::mappedAnew / sizeof(int));
 }
