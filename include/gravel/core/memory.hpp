@@ -36,15 +36,15 @@ void resizeAnew(std::vector<T>& v, std::size_t n) {
 /// Room for so many is kept where it is not needed.
 inline constexpr std::size_t fewEntries = 1024;
 
-/// [bytes] From here on allocators map memory anew at each use (32 MB with glibc), which costs time: 360 000
-/// bodies had twice the page faults.
-inline constexpr std::size_t mappedAnew = std::size_t{1} << 25U;
+/// [bytes] From here on room is kept all the same: the allocator would give it back to the system, and to
+/// touch it anew in every part of every step costs more than the sweeps that it is for.
+inline constexpr std::size_t muchMemory = std::size_t{1} << 20U;
 
-/// Leaves the room of what one part of a step fills, and no later one reads, to others, unless it is little,
-/// or would have to be mapped anew.
+/// Leaves the room of what one part of a step fills, and no later one reads, to others, unless it is little
+/// or much.
 template <class T>
 void giveBack(std::vector<T>& v) {
-  if (v.capacity() > fewEntries && v.capacity() < mappedAnew / sizeof(T)) {
+  if (v.capacity() > fewEntries && v.capacity() < muchMemory / sizeof(T)) {
     release(v);
   }
 }
