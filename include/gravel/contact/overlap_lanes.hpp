@@ -148,17 +148,16 @@ template <Real S>
   opened.way1 = shares.first * opened.missing;
   opened.way2 = shares.second * opened.missing;
   if (keepAngularMomentum) {
-    const auto turns = opens & (shares.first > zero) & (shares.second > zero);
+    const auto turns = opens & pair;
     const PackedVector<S> v_rel = b2.v - b1.v;
     const PackedVector<S> v_t = v_rel - n.dot(v_rel) * n;
     const P lost = opened.missing / choose(turns, distance + missing, one);  // v_t becomes (1 - lost) v_t
     const PackedVector<S> brake = choose(turns, lost * v_t, PackedVector<S>::zero());
     b1.v = b1.v + shares.first * brake;
     b2.v = b2.v - shares.second * brake;
+    const P reducedMass = choose(shares.first > zero, shares.first * b1.mass, shares.second * b2.mass);
     opened.loss = choose(
-        turns,
-        shares.first * b1.mass * v_t.squaredNorm() * lost * (P::all(S(2)) - lost) * P::all(S(1) / S(2)),
-        zero);
+        turns, reducedMass * v_t.squaredNorm() * lost * (P::all(S(2)) - lost) * P::all(S(1) / S(2)), zero);
   }
   b1.d = b1.d - opened.way1 * n;
   b2.d = b2.d + opened.way2 * n;

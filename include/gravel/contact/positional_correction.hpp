@@ -69,10 +69,11 @@ struct CorrectionReport {
 /// its bodies have moved by less than half of what ends the sweeps since it was opened, or at all where its
 /// overlap is hardly any: so one ball wedged into a heap costs what its surroundings cost.
 ///
-/// Two free spheres that are moved apart from r to r + d would gain the angular momentum m* d x v of their
+/// Two spheres that are moved apart from r to r + d would gain the angular momentum m* d x v of their
 /// relative velocity v. As on an orbit, the part of v across r becomes v_t r/(r + d) instead: momentum and
-/// angular momentum stay to rounding, and energy of motion can only fall. A rejected way: to give the
-/// difference to the spins, which would turn smooth spheres.
+/// angular momentum stay to rounding, and energy of motion can only fall. A fixed sphere is the limit of a
+/// heavy one: the angular momentum about its centre stays; and a plane that of a large one, with v_t
+/// unchanged. A rejected way: to give the difference to the spins, which would turn smooth spheres.
 template <Real S>
 class PositionalCorrection {
  public:
