@@ -60,6 +60,7 @@ class ContactSolver {
     if (!asMany || facts.others > 0 || !sameMovable(bodies)) {
       using Rows = std::span<const ContactColoring::Row>;
       before_.take(names_, inRows_ ? rowImpulses_ : restored_, inRows_ ? coloring_.rows() : Rows{});
+      restored_ = {};
       if (solved) {
         before_.findEnded(contacts.contacts, problem_.rows, bodies, ended_);
       }

@@ -27,7 +27,7 @@ class ImpulseList {
     resizeSparingly(pushes_, count);
     resizeSparingly(impacts_, count);
     if (!turns) {
-      turning_.clear();
+      release(turning_);
     } else if (turning_.size() != count) {
       turning_.assign(count, Turn{});
     }

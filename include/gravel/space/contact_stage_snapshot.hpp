@@ -138,6 +138,7 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
   }
   boundaries.assign(std::move(planes), static_cast<std::size_t>(planeNumbers[surfaces.size()]),
                     static_cast<std::size_t>(planeNumbers.back()));
+  contacts_.contacts.reserve(names.size() / 4);
   for (std::size_t k = 0; k < names.size() / 4; ++k) {
     const std::uint64_t* name = &names[4 * k];
     const Scalar* c = &places[10 * k];
