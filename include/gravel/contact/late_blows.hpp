@@ -20,9 +20,9 @@ namespace gravel {
 /// speed u lacks
 ///     du = -n.(a_1 - a_0) (t - h/2)/2
 /// and the pair's parting speed (J_n/m* u) du, which is made up when a_1 is known: along the line of centres
-/// of that moment, for angular momentum's sake. Blows after which a pair stays together, those that somebody
-/// else decides about, and friction are left as they are; and so is a pair that has turned by more than 60
-/// degrees since. In a uniform field a_1 = a_0, and nothing changes.
+/// of that moment, for angular momentum's sake. Blows after which a pair is pressed together, those that
+/// somebody else decides about, and friction are left as they are; and so is a pair that has turned by more
+/// than 60 degrees since. In a uniform field a_1 = a_0, and nothing changes.
 template <Real S>
 class LateBlows {
  public:
@@ -33,9 +33,11 @@ class LateBlows {
   template <ContactBodies B>
   void take(std::span<const Impact<S>> impacts, const B& bodies, const S& start, std::size_t place) {
     for (const Impact<S>& impact : impacts) {
-      if (!impact.rests && !impact.decided && impact.speed > S(0)) {
-        blows_.push_back({impact.first, impact.second, place, impact.normal, pull(bodies, impact),
-                          S(start + impact.time), impact.speed});
+      const S apart = pull(bodies, impact);
+      const bool stays = impact.rests && !(apart > S(0));
+      if (!stays && !impact.decided && impact.speed > S(0)) {
+        blows_.push_back(
+            {impact.first, impact.second, place, impact.normal, apart, S(start + impact.time), impact.speed});
       }
       ++place;
     }
