@@ -400,6 +400,41 @@ TEST_CASE("A contact of a file with what is not there is found anew, and no slee
   file.put(altered(good, "sleepers", 0, std::numeric_limits<double>::quiet_NaN()));
   CHECK_THROWS_WITH(again.restore(file.path()),
                     ContainsSubstring("a value of 'sleepers' that is not finite"));
+  // The one value of -1 among them is in the normal of the sleeper's contact with the floor, (0, 0, -1).
+  const auto [first, count] = findRecord(good, "sleepers");
+  std::vector<double> numbers(count);
+  std::memcpy(numbers.data(), good.data() + first, count * sizeof(double));
+  REQUIRE(std::count(numbers.begin(), numbers.end(), -1.0) == 1);
+  const auto place = std::find(numbers.begin(), numbers.end(), -1.0) - numbers.begin();
+  file.put(altered(good, "sleepers", static_cast<std::size_t>(place), -0.5));
+  CHECK_THROWS_WITH(again.restore(file.path()),
+                    ContainsSubstring("a contact of a sleeper whose normal is no unit vector"));
+}
+
+// Seen to fail: restored without a word where mass or radius is 0, for then the factor is of no inertia; the
+// next step refused it.
+TEST_CASE("An inertia factor that no step takes is refused in a file, too, of points and of spheres") {
+  const TemporaryFile file("factor");
+  for (const double radius : {0.0, 0.5}) {
+    Space<double> saved(plain(5e-3));
+    saved.addBody(ball({0, 0, 0}, {0, 0, 0}, radius));
+    saved.save(file.path());
+    const std::vector<char> good = file.bytes();
+    Space<double> space = busy<double>();
+    const auto before = stateOf(space);
+    for (const double factor : {0.0, -0.4}) {
+      CAPTURE(radius, factor);
+      file.put(altered(good, "inertiaFactor", 0, factor));
+      CHECK_THROWS_WITH(space.restore(file.path()), ContainsSubstring("of body 0 is") &&
+                                                        ContainsSubstring("inertia") &&
+                                                        ContainsSubstring("allowed: finite, > 0"));
+      CHECK(sameBits(stateOf(space), before));
+    }
+    file.put(altered(good, "inertiaFactor", 0, 1e-300));  // as good as a setter's
+    space.restore(file.path());
+    space.computeDynamics(0);
+    CHECK(space.body(0).inertiaFactor() == 1e-300);
+  }
 }
 
 TEST_CASE("The hook and the log stay those of the space that takes a file up") {

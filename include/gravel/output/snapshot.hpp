@@ -139,6 +139,16 @@ class SnapshotReader {
     return values[0];
   }
 
+  /// Refuses what no plane or contact has, but for rounding.
+  template <Real Scalar>
+  void requireUnit(const Vector3<Scalar>& normal, const char* what) const {
+    const Scalar off = normal.squaredNorm() - Scalar(1);
+    const Scalar rounding = Scalar(64) * Eigen::NumTraits<Scalar>::epsilon();
+    if (off > rounding || -off > rounding) {
+      fail(std::string("holds a ") + what + " whose normal is no unit vector");
+    }
+  }
+
   [[noreturn]] void fail(const std::string& why) const {
     throw std::runtime_error("gravel: the snapshot " + path_ + " " + why);
   }
@@ -231,6 +241,7 @@ Bodies<Scalar, SoA> loadBodies(SnapshotReader& in) {
     bodies.add(body.load(), body.id());
     detail::copyBody(bodies.storage(), i, fieldsOf, i);  // forces, and bits that load() rounds
   }
+  bodies.validateAll();  // load() makes no inertia of a factor out of range where mass or radius is 0
   return bodies;
 }
 

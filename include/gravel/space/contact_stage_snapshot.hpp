@@ -110,12 +110,6 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
       ofPairs.size() != 2 * pairMaterials.size()) {
     in.fail("holds lists of different lengths");
   }
-  const auto checkUnit = [&](const Scalar* n, const char* what) {
-    const Scalar off = n[0] * n[0] + n[1] * n[1] + n[2] * n[2] - Scalar(1);
-    if (detail::sizeOf<Scalar>(off) > Scalar(64) * Eigen::NumTraits<Scalar>::epsilon()) {
-      in.fail(std::string("holds a ") + what + " whose normal is no unit vector");
-    }
-  };
   materials.assign(std::move(surfacesOf));
   for (std::size_t p = 0; p < pairMaterials.size(); ++p) {
     materials.setPair(MaterialId{ofPairs[2 * p]}, MaterialId{ofPairs[2 * p + 1]}, pairMaterials[p]);
@@ -127,8 +121,9 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
       in.fail("holds planes that are not in the order of their numbers");
     }
     const Scalar* side = &sides[11 * p];
-    checkUnit(side, "plane");
-    planes.push_back({{side[0], side[1], side[2]},
+    const Vector3<Scalar> normal(side[0], side[1], side[2]);
+    in.requireUnit(normal, "plane");
+    planes.push_back({normal,
                       side[3],
                       MaterialId{surfaces[p]},
                       {side[4], side[5], side[6]},
@@ -142,16 +137,11 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
   for (std::size_t k = 0; k < names.size() / 4; ++k) {
     const std::uint64_t* name = &names[4 * k];
     const Scalar* c = &places[10 * k];
-    checkUnit(c, "contact");
+    const Vector3<Scalar> normal(c[0], c[1], c[2]);
+    in.requireUnit(normal, "contact");
     validate(pairs[k], "a contact");
-    contacts_.push_back({static_cast<std::uint32_t>(name[0]),
-                         static_cast<std::uint32_t>(name[1]),
-                         name[2],
-                         name[3],
-                         {c[0], c[1], c[2]},
-                         c[3],
-                         c[4],
-                         c[5]},
+    contacts_.push_back({static_cast<std::uint32_t>(name[0]), static_cast<std::uint32_t>(name[1]), name[2],
+                         name[3], normal, c[3], c[4], c[5]},
                         {pairs[k], {c[6], c[7], c[8]}, c[9]});
   }
   std::vector<StoredImpulse<Scalar>> memory(keys.size() / 2);

@@ -111,6 +111,7 @@ class IslandReader {
       c.key1 = name();
       c.key2 = name();
       c.normal = vector();
+      in_.requireUnit(c.normal, "contact of a sleeper");
       c.gap = number();
       c.arm1 = number();
       c.arm2 = number();
