@@ -10,6 +10,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include <cerrno>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
@@ -23,6 +24,10 @@
 #endif
 #ifdef __linux__
 #include <unistd.h>
+#endif
+#if __has_include(<sys/file.h>)
+#include <fcntl.h>
+#include <sys/file.h>
 #endif
 
 namespace {
@@ -77,6 +82,20 @@ fs::path madeFolder(const fs::path& folder) {
                              (error ? error.message() : "there is a file of that name"));
   }
   return folder;
+}
+
+/// Keeps the folder for this run as long as the program lives, however it ends: two in one folder would write
+/// over each other's files. Nothing happens where folders cannot be locked.
+void claim(const fs::path& folder) {
+#if __has_include(<sys/file.h>)
+  const int handle = open(folder.c_str(), O_RDONLY | O_CLOEXEC);  // stays open, and with it the lock
+  if (handle >= 0 && flock(handle, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+    throw std::runtime_error("another gravel-run is writing to the output folder " + folder.string() +
+                             "; wait for its end, or give another one by --output");
+  }
+#else
+  static_cast<void>(folder);
+#endif
 }
 
 /// What is to be done at evenly spaced times; done at the first step at or after each, so that what is
@@ -161,6 +180,7 @@ int run(const Options& options) {
 
   const fs::path folder =
       madeFolder(options.output.empty() ? fs::path("out") / scene.name : fs::path(options.output));
+  claim(folder);
   // What an earlier run said at its end is not of this one, which may end without a word.
   for (const fs::path& last :
        {fs::path("summary.txt"), fs::path("picture.png"), "frames" / fs::path(scene.name + ".pvd")}) {
