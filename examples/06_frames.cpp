@@ -1,17 +1,23 @@
 /// Two piles of rocks meet at their escape speed. What one learns: frames for ParaView from a loop of one's
 /// own, contacts, and what each phase of a step cost. Open frames/merger.pvd, glyph by `radius`.
+///
+/// 06_frames [steps]
 
 #include "scenes/scenes.hpp"
 #include <gravel/gravel.hpp>
 
+#include <CLI/CLI.hpp>
+
 #include <cstdio>
-#include <cstdlib>
 
 int main(int argc, char** argv) {
-  const int steps = argc > 1 ? std::atoi(argv[1]) : 1500;
-  if (steps < 1) {
-    std::printf("usage: 06_frames [steps, at least 1]\n");
-    return 2;
+  int steps = 1500;
+  CLI::App app{"Two piles of rocks meet. Frames for ParaView go to the folder frames."};
+  app.add_option("steps", steps, "of 4 s each; default: 1500")->check(CLI::Range(1, 1'000'000));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
   }
   gravel::scenes::CloudOptions cloud;
   cloud.count = 150;

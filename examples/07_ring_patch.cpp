@@ -8,15 +8,20 @@
 
 #include "scenes/ring.hpp"
 
+#include <CLI/CLI.hpp>
+
 #include <cstdio>
-#include <cstdlib>
 
 int main(int argc, char** argv) {
-  const int count = argc > 1 ? std::atoi(argv[1]) : 150;
-  const int orbits = argc > 2 ? std::atoi(argv[2]) : 5;
-  if (count < 100 || orbits < 1) {
-    std::printf("usage: 07_ring_patch [bodies, at least 100] [orbits, at least 1]\n");
-    return 2;
+  int count = 150;
+  int orbits = 5;
+  CLI::App app{"A patch of a planet's ring of two optical depths, measured."};
+  app.add_option("bodies", count, "in the patch; default: 150")->check(CLI::Range(100, 1'000'000));
+  app.add_option("orbits", orbits, "to settle, and to measure; default: 5")->check(CLI::Range(1, 1'000'000));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
   }
   std::printf(
       "depth      c_x    c_y    c_z      c   filling   nu_trans   nu_coll      nu   nu by energy   "
