@@ -15,6 +15,10 @@ if(FROM STREQUAL "find_package" OR FROM STREQUAL "pkg-config")
   execute_process(COMMAND "${CMAKE_COMMAND}" --install "${GRAVEL_BUILD}" --prefix "${WORK}/first place"
     OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
   file(RENAME "${WORK}/first place" "${WORK}/moved")
+  # The runner comes along where it was built.
+  if(EXISTS "${GRAVEL_BUILD}/examples/gravel-run")
+    execute_process(COMMAND "${WORK}/moved/bin/gravel-run" --version OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
+  endif()
   # Nothing installed may remember where it was built or first put.
   file(GLOB_RECURSE files "${WORK}/moved/share/*")
   foreach(file IN LISTS files)

@@ -1,4 +1,5 @@
-# Install rules: headers, the CMake package and the pkg-config file. All of it can be moved as a whole.
+# Install rules: headers, the CMake package, the pkg-config file, and the runner where one was built. All of it can be
+# moved as a whole.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -44,3 +45,7 @@ configure_file("${PROJECT_SOURCE_DIR}/cmake/gravel.pc.in" "${PROJECT_BINARY_DIR}
 install(FILES "${PROJECT_BINARY_DIR}/gravel.pc" DESTINATION "${gravel_pc_dir}")
 
 install(FILES "${PROJECT_SOURCE_DIR}/LICENSE" DESTINATION "${CMAKE_INSTALL_DOCDIR}")
+
+if(TARGET gravel-run)
+  install(TARGETS gravel-run RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}" OPTIONAL)
+endif()
