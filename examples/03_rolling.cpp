@@ -36,6 +36,7 @@ int main() {
     std::printf("%8.2f   %11.5f   %30.5f\n", space.time(), body.velocity().x(), slip);
   }
   const auto e = space.energyLedger();
-  std::printf("\nOf %.2f J it kept %.2f J; friction took %.2f J, two sevenths of the start: %.2f J.\n",
-              e.total(), e.mechanical(), e.friction, 2.0 / 7.0 * (0.5 * 7.0 * v0 * v0));
+  std::printf(
+      "\nOf %.2f J of motion it kept %.2f J; friction took %.2f J, two sevenths of the start: %.2f J.\n",
+      0.5 * ball.mass * v0 * v0, e.kinetic + e.rotational, e.friction, ball.mass * v0 * v0 / 7.0);
 }
