@@ -47,8 +47,8 @@ class ContactProblem : public detail::ProblemBodies<S> {
   bool drifting = false;                       ///< any contact whose second side drifts
   bool grips = false;                          ///< any contact with more friction at rest than in a slide
   bool atOnce = false;       ///< rows slide as soon as friction is cut: there is no time to ask
-  bool active = false;       ///< any contact that approaches faster than it may
-  S largestApproach = S(0);  ///< largest change of a normal velocity that a contact asks for
+  bool active = false;       ///< any contact that approaches faster than it may, or is held by friction
+  S largestApproach = S(0);  ///< largest change of a normal velocity that a contact asks for; heldAcross()
   S wrong_sq = S(0);  ///< if `again`, the largest change of a velocity that a sweep would make, squared
   /// If `again`, rows at rest between bodies that begin as they did were passed over: isPassed().
   bool passes = false;
@@ -286,6 +286,9 @@ class ContactProblem : public detail::ProblemBodies<S> {
   /// What slid in the last solve slides: its friction was at the kinetic limit.
   [[gnu::always_inline]] inline void recallSlides(const Group& group, const Lanes& row);
   bool slid(std::size_t k, const S& kineticFriction) const;
+
+  /// A share of the largest slip that a step's fall gives a contact with a load, where `approach` is less.
+  S heldAcross(const ContactColoring& colouring, const S& dt, const S& approach) const;
 
   /// Rows that were taken up, and their impulses.
   [[gnu::always_inline]] inline void put(const Group& group, const Lanes& row) {

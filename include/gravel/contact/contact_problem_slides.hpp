@@ -94,4 +94,31 @@ inline void ContactProblem<S>::recallSlides(const Group& group, const Lanes& row
   }
 }
 
+template <Real S>
+S ContactProblem<S>::heldAcross(const ContactColoring& colouring, const S& dt, const S& approach) const {
+  // What friction alone holds, as an arch between two walls, falls along the walls and in step: nothing
+  // approaches anything, and sweeps still have to begin with the loads, and to end. A 64th, so that who does
+  // approach is solved to what that asks for.
+  const S share = S(1) / S(64);
+  const S fall = speedIn(S(this->mostFall_ * dt));
+  S most(0);
+  if (!friction || !(ratio_ > S(0)) || !(approach < S(2) * share * fall)) {
+    return most;
+  }
+  for (std::size_t k = colouring.loneCount(); k < rows.size(); ++k) {  // the maximum: the order has no say
+    const S load = marks[k].taken ? impulses_->normal(k) : last_->normal(k);
+    if (load > S(0) && rows[k].stick > S(0)) {
+      const auto& b1 = initial[colouring.rows()[k].slot1];
+      const auto& b2 = initial[colouring.rows()[k].slot2];
+      const Vector3<S> v_rel = b2.v - b1.v;
+      Vector3<S> slip = detail::slipVelocity(rows[k], v_rel, S(rows[k].n.dot(v_rel)), b1, b2);
+      if (!slipTargets.empty()) {
+        slip -= slipTargets[k];
+      }
+      most = std::max<S>(most, std::min<S>(detail::safeNorm(slip), speedIn(S((b1.fall + b2.fall) * dt))));
+    }
+  }
+  return share * most;
+}
+
 }  // namespace gravel

@@ -85,7 +85,7 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
           });
         });
   }
-  largestApproach = most.approach;
+  largestApproach = std::max<S>(most.approach, heldAcross(colouring, dt, most.approach));
   wrong_sq = most.wrong_sq;
   looks = most.looks;
   active = largestApproach > S(0);
