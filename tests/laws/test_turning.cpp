@@ -130,3 +130,41 @@ TEST_CASE("A pile turns in free fall as it does where nothing pulls, however fas
     CHECK(std::abs(Packing::shape(space) / before - 1) < phi_sq / 4);
   }
 }
+
+// Two spheres that pass their closest point in touch, one hundredth faster than they could turn as one: they
+// go on along Kepler's ellipse, whatever the restitution. After three turns errors of the integrator are of
+// second order (3e-5 at 400 steps a turn, 6e-4 at 100). Seen to fail: that the pair flies past itself is left
+// out of how it falls back, so that a blow without speed throws it up by a_n h/2 (1e-2 off, and 4e-6 of
+// energy made).
+TEST_CASE("A pair that grazes itself in an orbit goes on as if it had not") {
+  for (const double restitution : {0.0, 0.5, 1.0}) {
+    for (const double steps : {100.0, 400.0}) {
+      for (const double friction : {0.0, 0.5}) {
+        CAPTURE(restitution, steps, friction);
+        const double w = 1.01 * std::sqrt(0.25);
+        SimulationConfig<double> config = sticky(2 * pi<double>() / (w * steps), friction);
+        config.coeffRestitution = restitution;
+        Space<double> space(config);
+        for (const double side : {-1.0, 1.0}) {
+          space.addBody(ball({side, 0, 0}, {0, side * w, 0}, 1, 1, {0, 0, w}));
+        }
+        for (std::size_t k = 0; k < static_cast<std::size_t>(3 * steps); ++k) {
+          space.computeDynamics(k);
+        }
+        // The ellipse that begins at its closest point, 2, at the speed 2 w: E - e sin E = n t.
+        const double a = 1 / (1 - 2 * w * w);
+        const double e = 1 - 2 / a;
+        const double mean = std::sqrt(2 / (a * a * a)) * space.time();
+        double anomaly = mean;
+        for (int i = 0; i < 100; ++i) {
+          anomaly = mean + e * std::sin(anomaly);
+        }
+        const Vec apart = Vec(space.body(1).position()) - Vec(space.body(0).position());
+        CHECK(std::abs(apart.norm() - a * (1 - e * std::cos(anomaly))) < 16 / (steps * steps));
+        // What speed the errors leave along the line of centres is lost, and none is made.
+        CHECK(space.energyLedger().restitution < 4 / std::pow(steps, 4));
+        CHECK(space.energyLedger().restitution > -1e-15);
+      }
+    }
+  }
+}

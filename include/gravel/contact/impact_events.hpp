@@ -19,8 +19,9 @@ namespace gravel {
 /// unless a blow drives one of their bodies into the other.
 ///
 /// What bounces ever lower: where all bounces that are still to come, 2 e u / ((1 - e) |a_n|) after an
-/// approach at u, end before the step does, the pair comes to rest in this blow. It leaves with a hop that
-/// lands at the end of the step, where the solver of simultaneous contacts takes it over.
+/// approach at u, end before the step does (with a_n the rate of that of the distance), the pair comes to
+/// rest in this blow. It leaves with a hop that lands at the end of the step, where the solver of
+/// simultaneous contacts takes it over.
 ///
 /// Prediction is shared between threads, O(candidates + bodies x boundaries); blows follow one another in the
 /// order of (time, keys), each O(candidates of its two bodies). The same bits for any number of threads.
@@ -224,6 +225,13 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     return true;
   }
 
+  /// [m s^-2] >= 0, by which the distance d of two falls back: d'' = n.a + v_t^2/d. \param d [m] 0 of a
+  /// boundary
+  static S fallsBack(const S& a_n, const S& d, const Vector3<S>& v_t) {
+    const S rate = d > S(0) ? S(a_n + v_t.squaredNorm() / d) : a_n;
+    return rate < S(0) ? S(-rate) : S(0);
+  }
+
   /// Deals a blow. \return whether a course changed
   template <class Scene, class Decide>
   bool strike(const Scene& scene, const Event& event, const Decide& decide, ImpactReport<S>& report) {
@@ -237,9 +245,11 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     const bool boundary = event.second == staticPartner;
     const Vector3<S> v_rel = two.v - one.v + drift;
     const S v_n = n.dot(v_rel);
+    // By which the two fall back: their distance grows by how they fly past each other.
+    const S pull = fallsBack(at->a_n, boundary ? S(0) : distance, Vector3<S>(v_rel - v_n * n));
     const S noise = S(16) * Eigen::NumTraits<S>::epsilon() * (detail::maxAbs(one.v) + detail::maxAbs(two.v));
     const bool still = !(v_n + lead < -noise);
-    if (still && !(a_n < S(0))) {
+    if (still && !(pull > S(0))) {
       return false;
     }
     const S speed = v_n < S(0) ? S(-v_n) : S(0);
@@ -258,7 +268,6 @@ class ImpactEvents : private detail::ImpactCourses<S> {
         return true;
       }
     }
-    const S pull = a_n < S(0) ? S(-a_n) : S(0);
     const bool rests = pull > S(0) && (still || S(2) * e * speed <= (S(1) - e) * pull * (h - t));
     const S bounce = rests ? S(pull * (h - t) / S(2)) : e * speed;
     const S target = std::max<S>(bounce, S(-lead));  // off the wall's way as well
