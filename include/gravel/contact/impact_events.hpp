@@ -225,8 +225,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     return true;
   }
 
-  /// [m s^-2] >= 0, by which the distance d of two falls back: d'' = n.a + v_t^2/d. \param d [m] 0 of a
-  /// boundary
+  /// [m s^-2] >= 0, by which the distance d of two, 0 to a boundary, falls back: d'' = n.a + v_t^2/d.
   static S fallsBack(const S& a_n, const S& d, const Vector3<S>& v_t) {
     const S rate = d > S(0) ? S(a_n + v_t.squaredNorm() / d) : a_n;
     return rate < S(0) ? S(-rate) : S(0);
