@@ -287,6 +287,10 @@ class ContactProblem : public detail::ProblemBodies<S> {
   [[gnu::always_inline]] inline void recallSlides(const Group& group, const Lanes& row);
   bool slid(std::size_t k, const S& kineticFriction) const;
 
+  /// The part of row k's slip that is to vanish, with velocities `of` the slots.
+  template <class Ends>
+  Vector3<S> slipAt(std::size_t k, const ContactColoring& colouring, const std::vector<Ends>& of) const;
+
   /// A share of the largest slip that a step's fall gives a contact with a load, where `approach` is less.
   S heldAcross(const ContactColoring& colouring, const S& dt, const S& approach) const;
 

@@ -48,16 +48,20 @@ inline auto ContactProblem<S>::wrongAt(const Group& group, const Lanes& present)
 }
 
 template <Real S>
+template <class Ends>
+Vector3<S> ContactProblem<S>::slipAt(std::size_t k, const ContactColoring& colouring,
+                                     const std::vector<Ends>& of) const {
+  const Ends& b1 = of[colouring.rows()[k].slot1];
+  const Ends& b2 = of[colouring.rows()[k].slot2];
+  const Vector3<S> v_rel = b2.v - b1.v;
+  const Vector3<S> slip = detail::slipVelocity(rows[k], v_rel, S(rows[k].n.dot(v_rel)), b1, b2);
+  return slipTargets.empty() ? slip : Vector3<S>(slip - slipTargets[k]);
+}
+
+template <Real S>
 bool ContactProblem<S>::letSlide(const ContactColoring& colouring, const S& least) {
   const auto slips = [&](std::size_t k) {
-    const Body& b1 = bodies[colouring.rows()[k].slot1];
-    const Body& b2 = bodies[colouring.rows()[k].slot2];
-    const Vector3<S> v_rel = b2.v - b1.v;
-    Vector3<S> slip = detail::slipVelocity(rows[k], v_rel, S(rows[k].n.dot(v_rel)), b1, b2);
-    if (!slipTargets.empty()) {
-      slip -= slipTargets[k];
-    }
-    return slip.squaredNorm() > least * least;
+    return slipAt(k, colouring, bodies).squaredNorm() > least * least;
   };
   const auto look = [&](std::size_t begin, std::size_t end, std::size_t& count) {
     for (std::size_t k = std::max(begin, colouring.loneCount()); k < end; ++k) {
@@ -110,12 +114,8 @@ S ContactProblem<S>::heldAcross(const ContactColoring& colouring, const S& dt, c
     if (load > S(0) && rows[k].stick > S(0)) {
       const auto& b1 = initial[colouring.rows()[k].slot1];
       const auto& b2 = initial[colouring.rows()[k].slot2];
-      const Vector3<S> v_rel = b2.v - b1.v;
-      Vector3<S> slip = detail::slipVelocity(rows[k], v_rel, S(rows[k].n.dot(v_rel)), b1, b2);
-      if (!slipTargets.empty()) {
-        slip -= slipTargets[k];
-      }
-      most = std::max<S>(most, std::min<S>(detail::safeNorm(slip), speedIn(S((b1.fall + b2.fall) * dt))));
+      const S slip = detail::safeNorm(slipAt(k, colouring, initial));
+      most = std::max<S>(most, std::min<S>(slip, speedIn(S((b1.fall + b2.fall) * dt))));
     }
   }
   return share * most;

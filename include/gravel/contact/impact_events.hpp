@@ -245,7 +245,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     const Vector3<S> v_rel = two.v - one.v + drift;
     const S v_n = n.dot(v_rel);
     // By which the two fall back: their distance grows by how they fly past each other.
-    const S pull = fallsBack(at->a_n, boundary ? S(0) : distance, Vector3<S>(v_rel - v_n * n));
+    const S pull = fallsBack(a_n, boundary ? S(0) : distance, Vector3<S>(v_rel - v_n * n));
     const S noise = S(16) * Eigen::NumTraits<S>::epsilon() * (detail::maxAbs(one.v) + detail::maxAbs(two.v));
     const bool still = !(v_n + lead < -noise);
     if (still && !(pull > S(0))) {
