@@ -244,12 +244,12 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     const bool boundary = event.second == staticPartner;
     const Vector3<S> v_rel = two.v - one.v + drift;
     const S v_n = n.dot(v_rel);
-    // By which the two fall back: their distance grows by how they fly past each other.
     const S pull = fallsBack(a_n, boundary ? S(0) : distance, Vector3<S>(v_rel - v_n * n));
     const S noise = S(16) * Eigen::NumTraits<S>::epsilon() * (detail::maxAbs(one.v) + detail::maxAbs(two.v));
     const bool still = !(v_n + lead < -noise);
-    if (still && !(pull > S(0))) {
-      return false;
+    const S hop = pull * (h - t) / S(2);
+    if (still && (!(pull > S(0)) || !(std::max<S>(hop, S(-lead)) - v_n > noise))) {
+      return false;  // nothing presses them together, or they leave already, as fast as they would
     }
     const S speed = v_n < S(0) ? S(-v_n) : S(0);
     // In a heap, where both already lean on others, what a step's fall brings is rest, along what holds them.
@@ -268,7 +268,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
       }
     }
     const bool rests = pull > S(0) && (still || S(2) * e * speed <= (S(1) - e) * pull * (h - t));
-    const S bounce = rests ? S(pull * (h - t) / S(2)) : e * speed;
+    const S bounce = rests ? hop : S(e * speed);
     const S target = std::max<S>(bounce, S(-lead));  // off the wall's way as well
 
     const MassShares<S> share = massShares<S>(one.mass, one.movable, two.mass, two.movable);
