@@ -4,11 +4,13 @@
 #include "support/catch.hpp"
 #include "support/threads.hpp"
 #include <gravel/contact/coloured_rows.hpp>
+#include <gravel/contact/contact_islands.hpp>
 #include <gravel/contact/graph_coloring.hpp>
 
 #include <omp.h>
 
 #include <algorithm>
+#include <map>
 #include <numeric>
 #include <set>
 
@@ -86,7 +88,8 @@ Bodies<double, SoA> someFixed(std::uint32_t n, std::uint32_t period) {
 // Seen to fail: parts in the order of the colours.
 void checkParts(const ContactColoring& coloring) {
   std::vector<std::pair<std::size_t, std::size_t>> groups{{0, coloring.loneCount()},
-                                                          {coloring.loneCount(), coloring.begin(0)}};
+                                                          {coloring.loneCount(), coloring.islandsEnd()},
+                                                          {coloring.islandsEnd(), coloring.begin(0)}};
   for (std::size_t colour = 0; colour <= coloring.colours(); ++colour) {
     groups.emplace_back(coloring.begin(colour), coloring.end(colour));
   }
@@ -228,8 +231,14 @@ TEST_CASE("contacts of one colour share no movable body; lone ones share none wi
       CHECK((bodies[c.first].isFixed() || uses[c.first] == 1));
       CHECK((c.second == staticPartner || bodies[c.second].isFixed() || uses[c.second] == 1));
     }
+    CHECK(coloring.blocks() == coloring.bundles());
+    for (std::size_t bundle = 0; bundle < coloring.bundles(); ++bundle) {
+      for (const ContactColoring::Part& rows : coloring.coloursOf(bundle)) {
+        CHECK(rows.begin < rows.end);
+        check(rows.begin, rows.end);
+      }
+    }
     for (std::size_t colour = 0; colour < coloring.colours(); ++colour) {
-      CHECK(coloring.begin(colour) < coloring.end(colour));
       check(coloring.begin(colour), coloring.end(colour));
     }
     CHECK(coloring.begin(coloring.colours()) == contacts.size());  // no overflow here
@@ -477,4 +486,81 @@ TEST_CASE("slots stand in the order of ids, whatever the indices are") {
     bySlot.push_back(bodies.ids()[body]);
   }
   CHECK(bySlot == std::vector<std::uint64_t>(ids.begin(), ids.end()));
+}
+
+// Seen to fail: counts above fewRows taken for small; crowded rows not left out; islands told apart in the
+// order of their smallest bodies.
+TEST_CASE(
+    "contacts of small islands come bundle by bundle, each island whole and in the order of its colours") {
+  constexpr std::uint32_t n = 4000;
+  const Bodies<double, SoA> bodies = someFixed(n, 50);
+  std::vector<Contact<double>> contacts;
+  const auto touch = [&](std::uint32_t i, std::uint32_t j) {
+    contacts.push_back({i, j, i, j, {1, 0, 0}, -1.0, 1.0, 1.0});
+  };
+  // Chains of 1, 2, 3, ... contacts, up to more than are few; then a hub with more than there are colours.
+  std::uint32_t body = 0;
+  for (std::uint32_t length = 1; body + length + 100 < n; length += length < 12 ? 1 : 37) {
+    body += bodies[body].isFixed() ? 1 : 0;
+    std::uint32_t last = body;
+    for (std::uint32_t k = 0; k < length; ++k) {
+      std::uint32_t next = last + 1;
+      next += bodies[next].isFixed() ? 1 : 0;
+      touch(last, next);
+      last = next;
+    }
+    body = last + 1;
+  }
+  const std::uint32_t hub = body;
+  for (std::uint32_t i = 1; i <= 70; ++i) {
+    touch(hub, hub + i);
+  }
+  std::sort(contacts.begin(), contacts.end(), byKeys);
+  ContactIslands islands;
+  islands.find(std::span<const Contact<double>>(contacts), bodies);
+  const auto islandOf = [&](const Contact<double>& c) {
+    return islands.of(bodies[c.first].isFixed() ? c.second : c.first);
+  };
+  std::map<std::uint32_t, std::size_t> sizes;
+  for (const Contact<double>& c : contacts) {
+    ++sizes[islandOf(c)];
+  }
+  const auto isSmall = [&](const Contact<double>& c) {
+    const std::size_t size = sizes[islandOf(c)];
+    return size > 1 && size <= detail::SolverIslands::fewRows && c.first != hub;
+  };
+  ContactColoring coloring;
+  coloring.build(std::span<const Contact<double>>(contacts), bodies);
+  const auto few = static_cast<std::size_t>(std::count_if(contacts.begin(), contacts.end(), isSmall));
+  REQUIRE(few > 500);
+  REQUIRE(few + 200 < contacts.size());
+  CHECK(coloring.islandsEnd() - coloring.loneCount() == few);
+  REQUIRE(coloring.bundles() > 2);
+  std::map<std::uint32_t, std::uint32_t> numbers;  // by island
+  std::map<std::uint32_t, std::size_t> found;      // by number
+  for (std::size_t bundle = 0; bundle < coloring.bundles(); ++bundle) {
+    std::size_t rowsOfBundle = 0;
+    for (const ContactColoring::Part& rows : coloring.coloursOf(bundle)) {
+      std::set<std::uint32_t> taken;
+      for (std::size_t k = rows.begin; k < rows.end; ++k, ++rowsOfBundle) {
+        const Contact<double>& c = contacts[coloring.rows()[k].contact];
+        const std::uint32_t number = coloring.islandOf(k);
+        CHECK(isSmall(c));
+        CHECK(numbers.emplace(islandOf(c), number).first->second == number);
+        CHECK(coloring.islands().bundleOf(number) == bundle);
+        CHECK((coloring.islands().firstOf(bundle) <= number &&
+               number < coloring.islands().firstOf(bundle + 1)));
+        ++found[number];
+        for (const std::uint32_t i : {c.first, c.second}) {
+          CHECK((bodies[i].isFixed() || taken.insert(i).second));
+        }
+      }
+    }
+    CHECK(rowsOfBundle < 2 * detail::SolverIslands::fewRows);
+    CHECK((bundle + 1 == coloring.bundles() || rowsOfBundle >= detail::SolverIslands::fewRows));
+  }
+  for (const auto& [island, number] : numbers) {
+    CHECK(found[number] == sizes[island]);  // whole, in one bundle
+  }
+  checkParts(coloring);
 }

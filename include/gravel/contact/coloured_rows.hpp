@@ -48,13 +48,13 @@ void forAllParts(const ContactColoring& colouring, F&& f) {
   });
 }
 
-/// As sumOverParts() over all rows but the lone ones, blocks side by side, then colour after colour, and the
-/// overflow one by one.
+/// As sumOverParts() over all rows but the lone ones, blocks from the first one on side by side, then colour
+/// after colour, and the overflow one by one.
 template <class T, class F>
-T sumOverColourParts(const ContactColoring& colouring, const T& zero, F&& f) {
-  T sum = orderedSum(colouring.blocks(), 1, zero, [&](std::size_t block, std::size_t /*next*/) {
+T sumOverColourParts(const ContactColoring& colouring, const T& zero, F&& f, std::size_t first = 0) {
+  T sum = orderedSum(colouring.blocks() - first, 1, zero, [&](std::size_t block, std::size_t /*next*/) {
     T part = zero;
-    for (const ContactColoring::Part& rows : colouring.coloursOf(block)) {
+    for (const ContactColoring::Part& rows : colouring.coloursOf(first + block)) {
       f(std::size_t{rows.begin}, std::size_t{rows.end}, part);
     }
     return part;
@@ -67,6 +67,12 @@ T sumOverColourParts(const ContactColoring& colouring, const T& zero, F&& f) {
     f(k, k + 1, sum);
   }
   return sum;
+}
+
+/// The same without the rows of small islands.
+template <class T, class F>
+T sumOverLargeParts(const ContactColoring& colouring, const T& zero, F&& f) {
+  return sumOverColourParts(colouring, zero, f, colouring.bundles());
 }
 
 }  // namespace detail

@@ -4,6 +4,8 @@
 /// An order in which contacts can be solved at once: no two contacts of one colour share a movable body.
 
 #include <gravel/contact/contact_facts.hpp>
+#include <gravel/contact/row_parts.hpp>
+#include <gravel/contact/solver_islands.hpp>
 #include <gravel/core/check.hpp>
 #include <gravel/core/memory.hpp>
 #include <gravel/core/parallel.hpp>
@@ -47,6 +49,8 @@ class ContactColoring {
   void build(std::span<const Contact<S>> contacts, const B& bodies) {
     takeEnds(contacts, bodies.size());
     number(bodies);
+    islands_.find(std::span<const Row>(byContact_), movable_);
+    islands_.bundle(std::span<const Row>(byContact_), degree_, maxColours);
     choose();
     arrange();
     detail::giveBack(byContact_);
@@ -55,17 +59,22 @@ class ContactColoring {
     detail::giveBack(used_);
   }
 
-  /// Rows [begin, end).
-  struct Part {
-    std::uint32_t begin;
-    std::uint32_t end;
-  };
+  using Part = detail::RowPart;
 
-  /// Rows in the order of solving: lone ones, within blocks, colour 0, 1, …, overflow.
+  /// Rows in the order of solving: lone ones, those of small islands by bundle, within blocks, colour 0, 1,
+  /// …, overflow.
   std::span<const Row> rows() const { return rows_; }
   std::size_t loneCount() const { return loneCount_; }
-  /// Blocks, of which no two share a movable body; none where bodies are few. Then the colours within each.
+  const detail::SolverIslands& islands() const { return islands_; }
+  std::size_t islandsEnd() const { return islandsEnd_; }  ///< where rows of small islands end
+  bool isOfLarge(std::size_t k) const { return k >= islandsEnd_; }
+  /// The number of that of row k, if loneCount() <= k < islandsEnd().
+  std::uint32_t islandOf(std::size_t k) const { return islandOfRow_[k - loneCount_]; }
+  /// Blocks, of which no two share a movable body: first the bundles of small islands, then those of bodies,
+  /// none where bodies are few.
   std::size_t blocks() const { return ends_.size(); }
+  std::size_t bundles() const { return islands_.bundles(); }
+  /// The colours within a block.
   std::span<const Part> coloursOf(std::size_t block) const {
     const std::size_t first = block == 0 ? 0 : ends_[block - 1];
     return std::span<const Part>(inner_).subspan(first, ends_[block] - first);
@@ -75,15 +84,12 @@ class ContactColoring {
   std::size_t begin(std::size_t colour) const { return start_[colour]; }
   std::size_t end(std::size_t colour) const { return start_[colour + 1]; }
 
-  /// All rows, for passes over them in which contacts may share bodies: parts of up to `partSize` rows of one
-  /// group (a colour, all blocks, the lone ones, the overflow), those first that stand first in their groups.
-  /// So a thread that takes its share of the parts has about the rows, and the bodies, that it has when
-  /// colours are shared between threads one by one, and they stay in its cache.
-  static constexpr std::size_t partSize = 128;
-  static constexpr std::size_t fewRows = 4 * partSize;  ///< not worth the threads
-  std::span<const Part> parts() const { return parts_; }
+  /// All rows, for passes over them in which contacts may share bodies.
+  static constexpr std::size_t partSize = detail::RowParts::partSize;
+  static constexpr std::size_t fewRows = detail::RowParts::fewRows;  ///< not worth the threads
+  std::span<const Part> parts() const { return parts_.parts(); }
   /// How many parts are worth a task: all of them where threads share no group of rows.
-  std::size_t partsOfTask() const { return shared_ ? 1 : std::max<std::size_t>(1, parts_.size()); }
+  std::size_t partsOfTask() const { return parts_.ofTask(); }
 
   /// Body of each slot.
   std::span<const std::uint32_t> bodies() const { return bodyOfSlot_; }
@@ -100,6 +106,7 @@ class ContactColoring {
   /// Groups: colours within blocks, other colours, and these.
   static constexpr std::uint8_t overflow = 2 * maxColours;
   static constexpr std::uint8_t lone = overflow + 1;
+  static constexpr std::uint8_t inBundle = lone + 1;  ///< and above, by colour
 
   static constexpr std::size_t chunk = 8192;
   /// Slots of a block: the velocities of so many are a quarter of a megabyte in double.
@@ -169,6 +176,7 @@ class ContactColoring {
     used_.assign(movable_.size(), 0);
     detail::resizeSparingly(group_, byContact_.size());
     places_.assign(staticSlot() / blockSize + 1, Places{});
+    bundled_.assign(bundles(), {});
     colours_ = 0;
     const bool inBlocks = staticSlot() > fewBodies;
     for (std::size_t k = 0; k < byContact_.size(); ++k) {
@@ -186,6 +194,13 @@ class ContactColoring {
           colours_ = std::max<std::size_t>(colours_, colour + 1U);
           used_[slot1] |= std::uint64_t{movable_[slot1]} << colour;
           used_[slot2] |= std::uint64_t{movable_[slot2]} << colour;
+          const std::uint32_t island = islands_.numberOf(movable_[slot1] != 0 ? slot1 : slot2);
+          if (island != detail::SolverIslands::none) {
+            group_[k] = static_cast<std::uint8_t>(inBundle + colour);
+            ++bundled_[islands_.bundleOf(island)][colour];
+            ++places_[block][inBundle];
+            continue;
+          }
           const bool within = inBlocks && (movable_[slot2] == 0 || slot2 / blockSize == block);
           group_[k] = static_cast<std::uint8_t>(within ? colour : maxColours + colour);
         }
@@ -210,7 +225,7 @@ class ContactColoring {
     loneCount_ = next;
     inner_.clear();
     ends_.clear();
-    for (Places& block : places_) {
+    const auto placeBlock = [&](auto& block) {
       for (std::size_t colour = 0; colour < colours_; ++colour) {
         const auto begin = static_cast<std::uint32_t>(next);
         next += std::exchange(block[colour], next);
@@ -219,9 +234,12 @@ class ContactColoring {
         }
       }
       ends_.push_back(inner_.size());
-    }
-    if (inner_.empty()) {
-      ends_.clear();
+    };
+    std::for_each(bundled_.begin(), bundled_.end(), placeBlock);
+    islandsEnd_ = next;
+    std::for_each(places_.begin(), places_.end(), placeBlock);
+    if (next == islandsEnd_) {
+      ends_.resize(bundles());
     }
     start_.assign(1, next);
     for (std::size_t colour = 0; colour < colours_; ++colour) {
@@ -233,55 +251,51 @@ class ContactColoring {
     detail::resizeSparingly(rows_, byContact_.size());
     parallelForTasks<Share::Alike>(places_.size(), [&](std::size_t block) {
       for (std::size_t k = first[block]; k < first[block + 1]; ++k) {
-        rows_[places_[block][group_[k]]++] = byContact_[k];
+        if (group_[k] < inBundle) {
+          rows_[places_[block][group_[k]]++] = byContact_[k];
+        }
       }
     });
+    detail::resizeSparingly(islandOfRow_, islandsEnd_ - loneCount_);
+    for (std::size_t k = 0; k < byContact_.size() && !islandOfRow_.empty(); ++k) {
+      if (group_[k] >= inBundle) {
+        const Row& row = byContact_[k];
+        const std::uint32_t island = islands_.numberOf(movable_[row.slot1] != 0 ? row.slot1 : row.slot2);
+        const std::size_t to = bundled_[islands_.bundleOf(island)][group_[k] - inBundle]++;
+        rows_[to] = row;
+        islandOfRow_[to - loneCount_] = island;
+      }
+    }
     cut();
   }
 
   /// The parts.
   void cut() {
-    parts_.clear();
-    shared_ = false;
-    std::vector<std::pair<double, Part>> all;  // with where its middle stands in its group, 0 … 1
-    // Rows [begin, end) of the group of rows [from, to). Groups that are not shared are the calling thread's:
-    // it begins with them.
-    const auto add = [&](std::size_t begin, std::size_t end, std::size_t from, std::size_t to,
-                         bool isShared) {
-      shared_ = shared_ || isShared;
-      const detail::Chunks chunks(end - begin, partSize);
-      for (std::size_t c = 0; c < chunks.count(); ++c) {
-        const Part part{static_cast<std::uint32_t>(begin + chunks.begin(c)),
-                        static_cast<std::uint32_t>(begin + chunks.end(c))};
-        const double middle = 0.5 * (static_cast<double>(part.begin) + static_cast<double>(part.end));
-        all.emplace_back(
-            isShared ? (middle - static_cast<double>(from)) / static_cast<double>(to - from) : 0.0, part);
-      }
-    };
-    const auto addGroup = [&](std::size_t begin, std::size_t end, bool serial) {
-      add(begin, end, begin, end, end - begin >= fewRows && !serial);
-    };
-    addGroup(0, loneCount(), false);
-    for (const Part& colour : inner_) {
-      add(colour.begin, colour.end, loneCount(), start_.front(), true);
+    parts_.begin();
+    parts_.addGroup(0, loneCount());
+    parts_.addGroup(loneCount(), islandsEnd());
+    const std::size_t first = bundles() == 0 ? 0 : ends_[bundles() - 1];
+    for (const Part& colour : std::span<const Part>(inner_).subspan(first)) {
+      parts_.add(colour, islandsEnd(), start_.front(), true);
     }
-    for (std::size_t colour = 0; colour <= colours(); ++colour) {
-      addGroup(begin(colour), end(colour), colour == colours());
+    for (std::size_t colour = 0; colour < colours(); ++colour) {
+      parts_.addGroup(begin(colour), end(colour));
     }
-    std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-    for (const auto& part : all) {
-      parts_.push_back(part.second);
-    }
+    parts_.addGroup(begin(colours()), end(colours()), false);
+    parts_.end();
   }
 
   std::vector<Row> rows_;
-  std::vector<Part> parts_;
-  bool shared_ = false;  ///< any group is shared between threads
-  using Places = std::array<std::size_t, 2 * maxColours + 2>;
+  detail::RowParts parts_;
+  detail::SolverIslands islands_;
+  std::size_t islandsEnd_ = 0;
+  std::vector<std::uint32_t> islandOfRow_;  ///< from the first one of small islands on
+  using Places = std::array<std::size_t, 2 * maxColours + 3>;
   std::vector<Places> places_;  ///< by block of first bodies, of its next row in each group
   std::size_t loneCount_ = 0;
-  std::vector<Part> inner_;        ///< rows of the colours of blocks
-  std::vector<std::size_t> ends_;  ///< by block, there
+  std::vector<Part> inner_;                                   ///< rows of the colours of blocks
+  std::vector<std::size_t> ends_;                             ///< by block, there
+  std::vector<std::array<std::size_t, maxColours>> bundled_;  ///< by bundle, of its next row in each colour
   std::size_t colours_ = 0;
   std::vector<std::size_t> start_{0, 0};
   std::vector<std::uint32_t> bodyOfSlot_;

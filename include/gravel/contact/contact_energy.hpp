@@ -26,11 +26,11 @@ class ContactEnergy {
   /// Guards the energy of `problem`, fills in the losses of the report, and completes the list of its
   /// impulses, in SI units. O(contacts). \param others the rows are not those of the last call
   void book(ContactProblem<S>& problem, const ContactColoring& colouring, const ContactView<S>& contacts,
-            const detail::SolverIslands& islands, bool others, ContactReport<S>& report) {
+            bool others, ContactReport<S>& report) {
     detail::resizeAnew(terms_, problem.rows.size());
     known_ = known_ && !others;
     Sums sums = takeDown(problem, colouring, contacts);
-    if (sums[3] > S(0) && guard(problem, colouring, contacts, islands)) {
+    if (sums[3] > S(0) && guard(problem, colouring, contacts)) {
       sums = takeDown(problem, colouring, contacts);
     }
     if (problem.isScaled()) {
@@ -171,13 +171,12 @@ class ContactEnergy {
 
   /// Islands: movable bodies joined by contacts. dT of an island is beta a + beta^2 b under a common factor
   /// beta, a = sum J.u^- and b = sum J.(u^+ - u^-)/2 >= 0: zero at beta = -a/b.
-  bool guard(ContactProblem<S>& problem, const ContactColoring& colouring, const ContactView<S>& contacts,
-             const detail::SolverIslands& islands) {
+  bool guard(ContactProblem<S>& problem, const ContactColoring& colouring, const ContactView<S>& contacts) {
     if (!known_) {
-      nameIslands(colouring, islands);
+      nameIslands(colouring);
       known_ = true;
     }
-    findGains(colouring, islands.size());
+    findGains(colouring);
     const bool any =
         std::any_of(gains_.begin(), gains_.end(), [](const Gain& gain) { return gain.isReal(); });
     if (any) {
@@ -203,13 +202,13 @@ class ContactEnergy {
           island.beta = a < S(0) && b > S(0) ? std::min<S>(S(1), S(-a / b)) : S(0);
         }
       }
-      shrink(problem, colouring, islands);
+      shrink(problem, colouring);
     }
     return any;
   }
 
   /// Most rows that follow each other are of one island: each run of them is summed by itself.
-  void findGains(const ContactColoring& colouring, std::size_t islands) {
+  void findGains(const ContactColoring& colouring) {
     const std::size_t piece = std::max<std::size_t>(16, colouring.partsOfTask());
     const std::size_t pieces = (colouring.parts().size() + piece - 1) / piece;
     runs_.resize(std::max(runs_.size(), pieces));
@@ -227,7 +226,7 @@ class ContactEnergy {
         }
       }
     });
-    gains_.assign(islands, Gain{});
+    gains_.assign(colouring.islands().size(), Gain{});
     for (std::size_t p = 0; p < pieces; ++p) {
       for (const Run& run : runs_[p]) {
         gains_[run.island].sum += run.gain.sum;
@@ -236,18 +235,17 @@ class ContactEnergy {
     }
   }
 
-  void nameIslands(const ContactColoring& colouring, const detail::SolverIslands& islands) {
+  void nameIslands(const ContactColoring& colouring) {
     detail::resizeAnew(islandOfRow_, colouring.rows().size());
     detail::forAllParts(colouring, [&](std::size_t begin, std::size_t end) {
       for (std::size_t k = begin; k < end; ++k) {
         const ContactColoring::Row& row = colouring.rows()[k];
-        islandOfRow_[k] = islands.of(colouring.movable(row.slot1) ? row.slot1 : row.slot2);
+        islandOfRow_[k] = colouring.islands().of(colouring.movable(row.slot1) ? row.slot1 : row.slot2);
       }
     });
   }
 
-  void shrink(ContactProblem<S>& problem, const ContactColoring& colouring,
-              const detail::SolverIslands& islands) {
+  void shrink(ContactProblem<S>& problem, const ContactColoring& colouring) {
     for (std::size_t k = 0; k < problem.rows.size(); ++k) {
       const S beta = islands_[islandOfRow_[k]].beta;
       if (beta < S(1)) {
@@ -255,7 +253,7 @@ class ContactEnergy {
       }
     }
     for (std::uint32_t slot = 0; slot < colouring.bodies().size(); ++slot) {
-      const S beta = islands_[islands.of(slot)].beta;
+      const S beta = islands_[colouring.islands().of(slot)].beta;
       if (beta < S(1) && colouring.movable(slot)) {
         Body& b = problem.bodies[slot];
         const auto& b0 = problem.initial[slot];

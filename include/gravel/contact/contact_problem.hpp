@@ -48,8 +48,8 @@ class ContactProblem : public detail::ProblemBodies<S> {
   bool grips = false;                          ///< any contact with more friction at rest than in a slide
   bool atOnce = false;       ///< rows slide as soon as friction is cut: there is no time to ask
   bool active = false;       ///< any contact that approaches faster than it may, or is held by friction
-  S largestApproach = S(0);  ///< largest change of a normal velocity that a contact asks for; heldAcross()
-  S wrong_sq = S(0);  ///< if `again`, the largest change of a velocity that a sweep would make, squared
+  S largestApproach = S(0);  ///< largest change of a normal velocity that large islands ask for; heldAcross()
+  S wrong_sq = S(0);  ///< if `again`, the largest of a velocity that a sweep over them would make, squared
   /// If `again`, rows at rest between bodies that begin as they did were passed over: isPassed().
   bool passes = false;
   std::size_t looks = 0;  ///< at rows, to find `wrong_sq`
@@ -66,10 +66,10 @@ class ContactProblem : public detail::ProblemBodies<S> {
   ///        does to velocities what that did, `ratio` times, so that no contact needs to be asked; bodies
   ///        whose masses have changed are guarded against
   template <ContactBodies B>
-  void gather(const ContactView<S>& contacts, const B& source, const ContactColoring& colouring,
-              const detail::SolverIslands& islands, const S& dt, const ContactSettings<S>& settings,
-              const ContactKinds& kinds, detail::ImpulseList<S>& impulses, const detail::ImpulseList<S>& last,
-              const S& ratio, bool fresh, bool goesOn, const WayAhead<S>& way);
+  void gather(const ContactView<S>& contacts, const B& source, const ContactColoring& colouring, const S& dt,
+              const ContactSettings<S>& settings, const ContactKinds& kinds, detail::ImpulseList<S>& impulses,
+              const detail::ImpulseList<S>& last, const S& ratio, bool fresh, bool goesOn,
+              const WayAhead<S>& way);
 
   /// Calls f(group) for rows [begin, end), which share no movable body; brings what later ones need nearer.
   template <class F>
@@ -99,8 +99,8 @@ class ContactProblem : public detail::ProblemBodies<S> {
   bool isPassed(std::size_t k, const ContactColoring& colouring) const;
   /// Takes the impulses of rows that were passed over from the last problem.
   void recall(const ContactColoring& colouring);
-  /// Where all rows but the lone ones were passed over: the impulses of these change places with those in the
-  /// list of the last problem, which then becomes that of this one.
+  /// Where all rows of large islands were passed over: the impulses of the others change places with those in
+  /// the list of the last problem, which then becomes that of this one.
   void keepLast(const ContactColoring& colouring, detail::ImpulseList<S>& last);
   const detail::ImpulseList<S>& impulses() const { return *impulses_; }
   detail::ImpulseList<S>& impulses() { return *impulses_; }
@@ -109,7 +109,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
   /// Puts it back. \param kinds of the contacts
   template <ContactBodies B>
   void resume(const detail::SolvedProblem<S>& all, const B& source, const ContactColoring& colouring,
-              const detail::SolverIslands& islands, const ContactKinds& kinds);
+              const ContactKinds& kinds);
 
   /// Rows with their impulses. \param all  none of them was passed over
   [[gnu::always_inline]] inline Lanes load(const Group& group, bool all) const {
@@ -160,6 +160,17 @@ class ContactProblem : public detail::ProblemBodies<S> {
   /// Sweeps went on with static friction where it was not known who slides: those whose friction is at its
   /// limit, and whose slip exceeds `least`, do, and are to be looked at again. \return whether there are any
   bool letSlide(const ContactColoring& colouring, const S& least);
+  /// The same of row k. \return whether it begins to slide
+  bool letSlide(std::size_t k, const ContactColoring& colouring, const S& least);
+
+  /// The change of its normal velocity that row k asks for; of a small island, if `again`, wrongAt().
+  const S& approachAt(std::size_t k) const { return approaches_[k]; }
+  const S& wrongAt(std::size_t k) const { return wrongs_[k]; }
+  /// Whether what friction alone holds counts beside such a change, and for how much row k then does.
+  bool mayHold(const S& approach) const;
+  S heldAt(std::size_t k, const ContactColoring& colouring) const;
+  /// Rows [begin, end), which are all of their bodies, get no impulse.
+  void release(const ContactColoring& colouring, std::size_t begin, std::size_t end);
 
  private:
   /// What rows are taken up from.
@@ -174,19 +185,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
     const WayAhead<S>& way;
   };
 
-  /// The largest change that a contact asks for, the largest that a sweep would make, squared, and for how
-  /// many rows that was found.
-  struct Most {
-    S approach = S(0);
-    S wrong_sq = S(0);
-    std::size_t looks = 0;
-    Most& operator+=(const Most& other) {
-      looks += other.looks;
-      approach = std::max<S>(approach, other.approach);
-      wrong_sq = std::max<S>(wrong_sq, other.wrong_sq);
-      return *this;
-    }
-  };
+  using Most = detail::RowNeeds<S>;
   /// Whether what a row asks for left its restitution and its turn out of account, and whether it did so as
   /// one that carried a load before.
   enum class RowRest : std::uint8_t { Not, Free, Loaded };
@@ -291,8 +290,8 @@ class ContactProblem : public detail::ProblemBodies<S> {
   template <class Ends>
   Vector3<S> slipAt(std::size_t k, const ContactColoring& colouring, const std::vector<Ends>& of) const;
 
-  /// A share of the largest slip that a step's fall gives a contact with a load, where `approach` is less.
-  S heldAcross(const ContactColoring& colouring, const S& dt, const S& approach) const;
+  /// The most of rows from k on, where `approach` is less.
+  S heldAcross(const ContactColoring& colouring, std::size_t k, const S& approach) const;
 
   /// Rows that were taken up, and their impulses.
   [[gnu::always_inline]] inline void put(const Group& group, const Lanes& row) {
@@ -302,11 +301,13 @@ class ContactProblem : public detail::ProblemBodies<S> {
 
   std::vector<S> gaps_;                           ///< [m] by row
   std::vector<RowRest> rests_;                    ///< by row
+  std::vector<S> wrongs_;                         ///< by row of small islands
   std::vector<S> approaches_;                     ///< by row: change of the normal velocity that it asks for
   S threshold_ = S(0);                            ///< [m s^-1] of restitution, in the last problem
   detail::ImpulseList<S>* impulses_ = nullptr;    ///< of this problem, in its own units
   const detail::ImpulseList<S>* last_ = nullptr;  ///< while it is solved
   S ratio_ = S(0);
+  S step_ = S(0);  ///< [s]
 };
 
 }  // namespace gravel

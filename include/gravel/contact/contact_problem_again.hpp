@@ -51,7 +51,14 @@ void ContactProblem<S>::takeAgain(const Taking<B>& taking, const Group& group, M
   takeGuess(group, row, detail::BodyLanes<S>::load(bodies, group.slot1),
             detail::BodyLanes<S>::load(bodies, group.slot2));
   put(group, row);
-  most += Most{S(0), wrongAt(group, row).largest(), group.count};
+  const Pack wrong = wrongAt(group, row);
+  if (taking.colouring.isOfLarge(group.row[0])) {
+    most += Most{S(0), wrong.largest(), group.count};
+    return;
+  }
+  for (std::size_t lane = 0; lane < group.count; ++lane) {
+    wrongs_[group.row[lane]] = wrong[lane];
+  }
 }
 
 template <Real S>
@@ -75,7 +82,7 @@ void ContactProblem<S>::keepLast(const ContactColoring& colouring, detail::Impul
   if (last_ == impulses_) {
     return;  // they are there
   }
-  for (std::size_t k = 0; k < colouring.loneCount(); ++k) {
+  for (std::size_t k = 0; k < colouring.islandsEnd(); ++k) {
     const ContactImpulse<S> before = last.get(k);
     last.set(k, impulses_->get(k));
     impulses_->set(k, before);
@@ -93,7 +100,7 @@ detail::SolvedProblem<S> ContactProblem<S>::solved(const ContactColoring& colour
                           watch.holds() ? watch.ways()[slot] : S(0)});
   }
   for (std::size_t k = 0; k < rows.size() && watch.holds(); ++k) {
-    const S then = k < colouring.loneCount() ? S(0) : watch.then()[k];  // lone rows are not watched
+    const S then = k < colouring.islandsEnd() ? S(0) : watch.then()[k];  // those before are not watched
     all.rows.push_back({then, approaches_[k], rows[k].target, S(static_cast<int>(rests_[k]))});
   }
   all.still = watch.holds() ? watch.still() : S(0);
@@ -104,12 +111,11 @@ detail::SolvedProblem<S> ContactProblem<S>::solved(const ContactColoring& colour
 template <Real S>
 template <ContactBodies B>
 void ContactProblem<S>::resume(const detail::SolvedProblem<S>& all, const B& source,
-                               const ContactColoring& colouring, const detail::SolverIslands& islands,
-                               const ContactKinds& kinds) {
+                               const ContactColoring& colouring, const ContactKinds& kinds) {
   friction = kinds.rub || kinds.turn;
   again = false;
   this->bend_ = {};
-  gatherBodies(source, colouring, islands, S(0));
+  gatherBodies(source, colouring, S(0));
   std::vector<S> ways(bodies.size(), S(0));
   for (std::size_t slot = 0; slot < all.bodies.size(); ++slot) {
     initial[slot].v = speedIn(all.bodies[slot].v0);

@@ -1,7 +1,7 @@
 #pragma once
 
 /// \file
-/// Members of `ContactProblem` that know which rows slide.
+/// Members of `ContactProblem` that know which rows slide, and what slip is to vanish.
 ///
 /// Where a contact has more friction at rest than in a slide, Coulomb's law leaves several solutions open:
 /// one that slides loads its neighbours, which then may slide, too. Sought is the one in which a contact
@@ -59,18 +59,47 @@ Vector3<S> ContactProblem<S>::slipAt(std::size_t k, const ContactColoring& colou
 }
 
 template <Real S>
+template <class B>
+void ContactProblem<S>::aimSlip(const Taking<B>& taking, const Group& group, std::size_t lane,
+                                const Lanes& rowLanes, const S& drift_n, const Vector3<S>& turned) {
+  const std::uint32_t k = group.row[lane];
+  Row row;
+  row.n = rowLanes.n.at(lane);
+  row.c1 = rowLanes.c1[lane];
+  row.c2 = rowLanes.c2[lane];
+  Vector3<S>& slipTarget = slipTargets[k];
+  slipTarget = turned + drift_n * row.n;
+  slipTarget -= drifting ? driftOf(taking, group, lane) : Vector3<S>(Vector3<S>::Zero());
+  const Contact<S>& c = contactOf(taking, group, lane);
+  const S restored = marks[k].impact ? taking.contacts.material(c).tangentialRestitution : S(0);
+  if (restored > S(0)) {
+    const auto& b1 = initial[group.slot1[lane]];
+    const auto& b2 = initial[group.slot2[lane]];
+    const Vector3<S> v_rel = b2.v - b1.v;
+    const Vector3<S> slip = detail::slipVelocity(row, v_rel, S(row.n.dot(v_rel)), b1, b2);
+    slipTarget -= restored * Vector3<S>(slip - slipTarget);
+  }
+}
+
+template <Real S>
+bool ContactProblem<S>::letSlide(std::size_t k, const ContactColoring& colouring, const S& least) {
+  detail::RowMark& mark = marks[k];
+  const bool begins = mark.taken && mark.atLimit && !mark.kinetic && rows[k].stick > rows[k].slide &&
+                      slipAt(k, colouring, bodies).squaredNorm() > least * least;
+  if (begins) {
+    mark.kinetic = true;
+    if (mark.slides < detail::RowMark::patience) {
+      ++mark.slides;
+    }
+  }
+  return begins;
+}
+
+template <Real S>
 bool ContactProblem<S>::letSlide(const ContactColoring& colouring, const S& least) {
-  const auto slips = [&](std::size_t k) {
-    return slipAt(k, colouring, bodies).squaredNorm() > least * least;
-  };
   const auto look = [&](std::size_t begin, std::size_t end, std::size_t& count) {
-    for (std::size_t k = std::max(begin, colouring.loneCount()); k < end; ++k) {
-      detail::RowMark& mark = marks[k];
-      if (mark.taken && mark.atLimit && !mark.kinetic && rows[k].stick > rows[k].slide && slips(k)) {
-        mark.kinetic = true;
-        if (mark.slides < detail::RowMark::patience) {
-          ++mark.slides;
-        }
+    for (std::size_t k = std::max(begin, colouring.islandsEnd()); k < end; ++k) {
+      if (letSlide(k, colouring, least)) {
         watch.enterFirst(k, false);
         ++count;
       }
@@ -98,27 +127,44 @@ inline void ContactProblem<S>::recallSlides(const Group& group, const Lanes& row
   }
 }
 
+// What friction alone holds, as an arch between two walls, falls along the walls and in step: nothing
+// approaches anything, and sweeps still have to begin with the loads, and to end. So the largest slip counts
+// that a step's fall gives a contact with a load. A 64th, so that who does approach is solved to what that
+// asks for.
 template <Real S>
-S ContactProblem<S>::heldAcross(const ContactColoring& colouring, const S& dt, const S& approach) const {
-  // What friction alone holds, as an arch between two walls, falls along the walls and in step: nothing
-  // approaches anything, and sweeps still have to begin with the loads, and to end. A 64th, so that who does
-  // approach is solved to what that asks for.
-  const S share = S(1) / S(64);
-  const S fall = speedIn(S(this->mostFall_ * dt));
+bool ContactProblem<S>::mayHold(const S& approach) const {
+  return friction && ratio_ > S(0) && S(32) * approach < speedIn(S(this->mostFall_ * step_));
+}
+
+template <Real S>
+S ContactProblem<S>::heldAt(std::size_t k, const ContactColoring& colouring) const {
+  const S load = marks[k].taken ? impulses_->normal(k) : last_->normal(k);
+  if (!(load > S(0)) || !(rows[k].stick > S(0))) {
+    return S(0);
+  }
+  const auto& b1 = initial[colouring.rows()[k].slot1];
+  const auto& b2 = initial[colouring.rows()[k].slot2];
+  const S slip = detail::safeNorm(slipAt(k, colouring, initial));
+  return S(1) / S(64) * std::min<S>(slip, speedIn(S((b1.fall + b2.fall) * step_)));
+}
+
+template <Real S>
+S ContactProblem<S>::heldAcross(const ContactColoring& colouring, std::size_t k, const S& approach) const {
   S most(0);
-  if (!friction || !(ratio_ > S(0)) || !(approach < S(2) * share * fall)) {
-    return most;
+  for (; k < rows.size() && mayHold(approach); ++k) {  // the maximum: the order has no say
+    most = std::max<S>(most, heldAt(k, colouring));
   }
-  for (std::size_t k = colouring.loneCount(); k < rows.size(); ++k) {  // the maximum: the order has no say
-    const S load = marks[k].taken ? impulses_->normal(k) : last_->normal(k);
-    if (load > S(0) && rows[k].stick > S(0)) {
-      const auto& b1 = initial[colouring.rows()[k].slot1];
-      const auto& b2 = initial[colouring.rows()[k].slot2];
-      const S slip = detail::safeNorm(slipAt(k, colouring, initial));
-      most = std::max<S>(most, std::min<S>(slip, speedIn(S((b1.fall + b2.fall) * dt))));
-    }
+  return most;
+}
+
+template <Real S>
+void ContactProblem<S>::release(const ContactColoring& colouring, std::size_t begin, std::size_t end) {
+  for (std::size_t k = begin; k < end; ++k) {
+    impulses_->set(k, {});
+    marks[k].taken = true;
+    restart(colouring.rows()[k].slot1);
+    restart(colouring.rows()[k].slot2);
   }
-  return share * most;
 }
 
 }  // namespace gravel

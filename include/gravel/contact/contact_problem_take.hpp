@@ -11,8 +11,8 @@ namespace gravel {
 template <Real S>
 template <ContactBodies B>
 void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
-                               const ContactColoring& colouring, const detail::SolverIslands& islands,
-                               const S& dt, const ContactSettings<S>& settings, const ContactKinds& kinds,
+                               const ContactColoring& colouring, const S& dt,
+                               const ContactSettings<S>& settings, const ContactKinds& kinds,
                                detail::ImpulseList<S>& impulses, const detail::ImpulseList<S>& last,
                                const S& ratio, bool fresh, bool goesOn, const WayAhead<S>& way) {
   friction = kinds.rub || kinds.turn;
@@ -21,11 +21,12 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   drifting = kinds.drift;
   again = goesOn;
   this->bend_ = way.bend;
-  gatherBodies(source, colouring, islands, ratio);
+  gatherBodies(source, colouring, ratio);
   fresh = fresh || !sameScales_ || rows.size() != contacts.size();
   impulses_ = &impulses;
   last_ = &last;
   ratio_ = ratio;
+  step_ = dt;
   this->mostLoad_ = Eigen::NumTraits<S>::highest();
   kept = false;
   detail::resizeSparingly(rows, contacts.size());
@@ -37,6 +38,7 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   slipTargets.assign(slips ? rows.size() : 0, Vector3<S>::Zero());
   detail::resizeSparingly(rests_, contacts.size());
   detail::resizeSparingly(approaches_, contacts.size());
+  wrongs_.resize(colouring.islandsEnd());
   passes = again && watch.holds() && sameScales_ && ratio == S(1) && !kinds.spring && !drifting &&
            way.bend.empty() && !this->isScaled() && settings.restitutionThreshold == threshold_ &&
            (turning.empty() || last.turns());
@@ -45,9 +47,8 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   Most most = detail::sumOverParts(
       0, colouring.loneCount(), Most{}, [&](std::size_t begin, std::size_t end, Most& part) {
         forGroups(colouring, begin, end, [&](const Group& group) { put(group, take(taking, group, part)); });
-        for (std::size_t k = begin; k < end && again; ++k) {  // lone rows are solved without a guess
-          restart(colouring.rows()[k].slot1);
-          restart(colouring.rows()[k].slot2);
+        if (again) {  // lone rows are solved without a guess
+          release(colouring, begin, end);
         }
       });
   if (passes) {
@@ -56,8 +57,8 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
     }
     Most all = most;
     all += lookAtRows(taking, [&](std::size_t k, Most& part) {
-      if (isPassed(k, colouring)) {
-        part += Most{approaches_[k]};
+      if (colouring.isOfLarge(k) && isPassed(k, colouring)) {
+        part += Most{approaches_[k], S(0), 0, approaches_[k]};
         marks[k].taken = false;
         return false;
       }
@@ -85,11 +86,11 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
           });
         });
   }
-  largestApproach = std::max<S>(most.approach, heldAcross(colouring, dt, most.approach));
+  largestApproach = std::max<S>(most.approach, heldAcross(colouring, colouring.islandsEnd(), most.approach));
   wrong_sq = most.wrong_sq;
   looks = most.looks;
-  active = largestApproach > S(0);
-  const S stop = largestApproach + speedIn(S(this->mostFall_ * dt));
+  active = most.any > S(0) || heldAcross(colouring, colouring.loneCount(), most.any) > S(0);
+  const S stop = std::max<S>(most.any, largestApproach) + speedIn(S(this->mostFall_ * dt));
   this->mostLoad_ = S(100 * static_cast<double>(colouring.bodies().size())) * this->heaviest_ * stop;
 }
 
@@ -116,7 +117,8 @@ inline auto ContactProblem<S>::take(const Taking<B>& taking, const Group& group,
   if (taking.fresh && !turning.empty()) {
     fillTurning(taking, group, b1.spin, b2.spin);
   }
-  most += Most{aim(taking, group, row, b1, b2)};
+  const S any = aim(taking, group, row, b1, b2);
+  most += Most{taking.colouring.isOfLarge(group.row[0]) ? any : S(0), S(0), 0, any};
   return row;
 }
 
@@ -247,29 +249,6 @@ S ContactProblem<S>::rebound(const Taking<B>& taking, const Group& group, std::s
     target = S(-restitutionAt(material, detail::scaled<S>(speed, -speedExponent_)) * v_n);
   }
   return impact ? target : allowed < S(0) ? S(-allowed) : std::min<S>(target, -allowed);
-}
-
-template <Real S>
-template <class B>
-void ContactProblem<S>::aimSlip(const Taking<B>& taking, const Group& group, std::size_t lane,
-                                const Lanes& rowLanes, const S& drift_n, const Vector3<S>& turned) {
-  const std::uint32_t k = group.row[lane];
-  Row row;
-  row.n = rowLanes.n.at(lane);
-  row.c1 = rowLanes.c1[lane];
-  row.c2 = rowLanes.c2[lane];
-  Vector3<S>& slipTarget = slipTargets[k];
-  slipTarget = turned + drift_n * row.n;
-  slipTarget -= drifting ? driftOf(taking, group, lane) : Vector3<S>(Vector3<S>::Zero());
-  const Contact<S>& c = contactOf(taking, group, lane);
-  const S restored = marks[k].impact ? taking.contacts.material(c).tangentialRestitution : S(0);
-  if (restored > S(0)) {
-    const auto& b1 = initial[group.slot1[lane]];
-    const auto& b2 = initial[group.slot2[lane]];
-    const Vector3<S> v_rel = b2.v - b1.v;
-    const Vector3<S> slip = detail::slipVelocity(row, v_rel, S(row.n.dot(v_rel)), b1, b2);
-    slipTarget -= restored * Vector3<S>(slip - slipTarget);
-  }
 }
 
 template <Real S>

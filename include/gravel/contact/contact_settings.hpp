@@ -27,13 +27,19 @@ struct ContactSettings {
   /// long step left would else be open in a short one, and lose its force.
   Scalar gapStep = Scalar(0);
   int maxIterations = 100;  ///< >= 1: sweeps at most
-  bool warmStart = true;    ///< begin from the impulses of the last step
-  bool accelerate = true;   ///< momentum between sweeps; off: plain Gauss-Seidel
+  /// If > 0, small islands (SolverIslands) take sweepsOfLooks(contacts, islandLooks) of their own at most, in
+  /// place of maxIterations.
+  std::size_t islandLooks = 0;
+  bool warmStart = true;   ///< begin from the impulses of the last step
+  bool accelerate = true;  ///< momentum between sweeps; off: plain Gauss-Seidel
 };
+
+/// Looks at contacts that are cheap in any step.
+inline constexpr std::size_t usualLooks = 4000;
 
 /// As many sweeps over these contacts as make so many looks, from 20 to 1000: where contacts are few (below
 /// 200 of them, unless more looks are asked for) sweeps are cheap, and pass on what 20 would not.
-inline int sweepsOfLooks(std::size_t contacts, std::size_t looks = 4000) {
+inline int sweepsOfLooks(std::size_t contacts, std::size_t looks = usualLooks) {
   return static_cast<int>(std::clamp<std::size_t>(looks / std::max<std::size_t>(contacts, 1), 20, 1000));
 }
 
@@ -47,10 +53,11 @@ void limitSweeps(ContactSettings<S>& settings, std::size_t most, std::size_t con
     const S least = std::min<S>(settings.tolerance, Eigen::NumTraits<S>::epsilon());
     settings.tolerance = std::max<S>(S(0.01) * settings.tolerance, least);
   }
+  const std::size_t looks = remembers ? usualLooks : 1'000'000;
+  settings.islandLooks = most > 0 ? 0 : looks;
   settings.maxIterations =
-      most > 0    ? static_cast<int>(std::min<std::size_t>(most, std::numeric_limits<int>::max()))
-      : remembers ? sweepsOfLooks(contacts)
-                  : sweepsOfLooks(contacts, 1'000'000);
+      most > 0 ? static_cast<int>(std::min<std::size_t>(most, std::numeric_limits<int>::max()))
+               : sweepsOfLooks(contacts, looks);
 }
 
 /// Where bodies go after a solve. Contacts are right at the end of the way that follows, as pairs turn on it
@@ -72,7 +79,7 @@ struct ContactReport {
   std::size_t colours = 0;
   std::size_t impacts = 0;      ///< blows that were dealt at their own time inside the step
   std::size_t postponed = 0;    ///< bodies with so many blows in the step that the rest was solved at its end
-  int iterations = 0;           ///< sweeps
+  int iterations = 0;           ///< sweeps, of the island that took most
   std::size_t looks = 0;        ///< contacts that were looked at, over all sweeps
   Scalar residual = Scalar(0);  ///< [1] largest change of a velocity in the last sweep / largest approach
   Scalar restitutionLoss = Scalar(0);  ///< [J] energy taken by normal impulses

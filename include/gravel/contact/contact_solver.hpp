@@ -65,7 +65,6 @@ class ContactSolver {
         before_.findEnded(contacts.contacts, problem_.rows, bodies, ended_);
       }
       coloring_.build(contacts.contacts, bodies);
-      islands_.find(contacts.contacts, coloring_);
       before_.handOn(contacts.contacts, coloring_.rows(), names_, rowImpulses_);
       handedOn_ = true;
       otherRows_ = true;
@@ -102,8 +101,8 @@ class ContactSolver {
       // Forces that last give impulses in proportion of the steps.
       const S ratio = settings_.warmStart && memoryStep_ > S(0) ? S(dt / memoryStep_) : S(0);
       rowImpulses_.resize(contacts.size(), facts_.kinds.turn);
-      problem_.gather(contacts, bodies, coloring_, islands_, dt, settings_, facts_.kinds, rowImpulses_, *last,
-                      ratio, fresh_, goesOn && ratio > S(0), way);
+      problem_.gather(contacts, bodies, coloring_, dt, settings_, facts_.kinds, rowImpulses_, *last, ratio,
+                      fresh_, goesOn && ratio > S(0), way);
       fresh_ = false;
       if (problem_.active) {
         report = std::visit([&](auto& algorithm) { return algorithm.solve(problem_, coloring_, settings_); },
@@ -112,7 +111,7 @@ class ContactSolver {
         if (kept_) {
           problem_.keepLast(coloring_, before_.impulses());
         }
-        energy_.book(problem_, coloring_, contacts, islands_, otherRows_, report);
+        energy_.book(problem_, coloring_, contacts, otherRows_, report);
         otherRows_ = false;
         problem_.scatter(bodies, coloring_);
         goesOn_ = true;
@@ -213,7 +212,7 @@ class ContactSolver {
       return inOrder(before_.impulses());
     }
     std::vector<ContactImpulse<S>> same = inOrder(rowImpulses_);
-    for (std::size_t k = 0; k < coloring_.loneCount(); ++k) {
+    for (std::size_t k = 0; k < coloring_.islandsEnd(); ++k) {
       same[coloring_.rows()[k].contact] = before_.impulses().get(k);
     }
     return same;
@@ -239,7 +238,7 @@ class ContactSolver {
   void resume(const detail::SolvedProblem<S>& solved, const B& bodies) {
     if (solved.bodies.size() == coloring_.bodies().size() && !solved.bodies.empty() &&
         (solved.rows.size() == coloring_.rows().size() || solved.rows.empty())) {
-      problem_.resume(solved, bodies, coloring_, islands_, facts_.kinds);
+      problem_.resume(solved, bodies, coloring_, facts_.kinds);
       goesOn_ = true;
     }
   }
@@ -290,8 +289,7 @@ class ContactSolver {
   std::variant<SequentialImpulses<S>> algorithm_;
   ContactSettings<S> settings_;
   ContactColoring coloring_;
-  detail::SolverIslands islands_;  ///< of coloring_
-  ContactFacts<S> facts_;          ///< of the contacts of begin()
+  ContactFacts<S> facts_;  ///< of the contacts of begin()
   ContactProblem<S> problem_;
   ContactEnergy<S> energy_;
   PositionalCorrection<S> correction_;
@@ -307,7 +305,7 @@ class ContactSolver {
   detail::EarlierImpulses<S> before_;
   S memoryStep_ = S(0);
   bool handedOn_ = false;   ///< no solve() since
-  bool kept_ = false;       ///< the last solve() left all but lone rows with the impulses of the one before
+  bool kept_ = false;       ///< the last solve() left all large islands with the impulses of the one before
   bool goesOn_ = false;     ///< the last solve() was of these contacts, where they stand
   bool otherRows_ = true;   ///< than those that `energy_` knows
   bool sameNames_ = false;  ///< `before_` goes with `names_` and the present rows

@@ -5,9 +5,10 @@
 
 #include <gravel/contact/coloured_rows.hpp>
 #include <gravel/contact/contact_facts.hpp>
+#include <gravel/contact/contact_settings.hpp>
+#include <gravel/contact/correction_settings.hpp>
 #include <gravel/contact/overlap_lanes.hpp>
 #include <gravel/contact/row_watch.hpp>
-#include <gravel/core/check.hpp>
 #include <gravel/core/memory.hpp>
 #include <gravel/core/parallel.hpp>
 
@@ -15,59 +16,13 @@
 
 namespace gravel {
 
-/// How overlap is removed. A `Space` takes a factor of its own, 0.4 by default, and sweepsOfLooks().
-template <Real Scalar>
-struct CorrectionSettings {
-  Scalar factor = Scalar(0.8);  ///< [1], 0 … 1: part of each overlap to remove
-  Scalar slop = Scalar(0);      ///< [m] >= 0: overlap that stays
-  /// [1] > 0: largest part of the smaller of the two radii by which one contact is opened in a call, so that
-  /// deep overlaps come apart over several steps.
-  Scalar cap = Scalar(0.5);
-  Scalar tolerance =
-      Scalar(1e-3);  ///< [1] > 0: sweeps end when the largest move is this times the largest overlap
-  /// [1] >= 0: overlaps that are right to this times the smallest radius of a contact are right; nothing is
-  /// moved while all are, and where some are not, those below a quarter of it stay unless others are pressed
-  /// into them.
-  Scalar precision = Scalar(1e-4);
-  int maxIterations = 20;  ///< >= 1
-  /// A pair that is moved apart keeps its angular momentum: it turns the slower. Off: velocities stay.
-  bool keepAngularMomentum = true;
-};
-
-/// \throws std::invalid_argument naming the setting, its value and what is allowed
-template <Real S>
-void validate(const CorrectionSettings<S>& settings) {
-  detail::require("correction factor", settings.factor, detail::Range<S>{S(0), S(1), "0 to 1"});
-  detail::require("correction slop", settings.slop, detail::nonNegative<S>());
-  detail::require("correction cap", settings.cap, detail::positive<S>());
-  detail::require("correction tolerance", settings.tolerance, detail::positive<S>());
-  detail::require("correction precision", settings.precision, detail::nonNegative<S>());
-  if (settings.maxIterations < 1) {
-    detail::refuse("correction maxIterations", std::to_string(settings.maxIterations), ">= 1");
-  }
-}
-
-/// A body that was moved, and by how much [m].
-template <Real Scalar>
-struct Displacement {
-  std::uint32_t body;
-  Vector3<Scalar> shift;
-};
-
-template <Real Scalar>
-struct CorrectionReport {
-  int iterations = 0;
-  Scalar largestOverlap = Scalar(0);  ///< [m] before
-  Scalar residual = Scalar(0);        ///< [m] largest move of the last sweep
-  Scalar loss = Scalar(0);            ///< [J] >= 0, of energy of motion
-};
-
 /// Nonlinear projected Gauss-Seidel over the colours of the contacts: in turn each contact that is still
 /// closer than it should be is opened along its present normal, by inverse mass, so that the common centre of
 /// mass of movable bodies stays to rounding. Distances are recomputed from the moved positions; only relative
 /// displacements enter, so that a place far from the origin costs no digits. A contact is passed over while
 /// its bodies have moved by less than half of what ends the sweeps since it was opened, or at all where its
-/// overlap is hardly any: so one ball wedged into a heap costs what its surroundings cost.
+/// overlap is hardly any: so one ball wedged into a heap costs what its surroundings cost. Sweeps over a
+/// small island end as its own overlaps say, and the others' together.
 ///
 /// Two spheres that are moved apart from r to r + d would gain the angular momentum m* d x v of their
 /// relative velocity v. As on an orbit, the part of v across r becomes v_t r/(r + d) instead: momentum and
@@ -103,29 +58,33 @@ class PositionalCorrection {
         watch_.enterFirst(k, deep_[colouring.rows()[k].contact] == 0);
       }
     });
-    S before = Eigen::NumTraits<S>::highest();  // largest move of the last sweep that was looked at
-    bool falls = true;
-    do {
+    const Opened ofIslands =
+        orderedSum(colouring.bundles(), 1, Opened{}, [&](std::size_t bundle, std::size_t /*next*/) {
+          return openBundle(contacts, colouring, bundle, settings);
+        });
+    Course course{enough, settings.maxIterations};
+    bool goesOn = true;
+    while (goesOn) {
       const auto open = [&](std::size_t begin, std::size_t end, Opened& sum) {
         const auto stale = [&](std::size_t k) {
           const ContactColoring::Row& place = colouring.rows()[k];
           return watch_.isStale(k, place.slot1, place.slot2);
         };
         detail::forGroupsOf<S>(colouring, begin, end, stale, [&](const Group& group) {
-          openAll(contacts, colouring, group, settings, sum);
+          openAll(contacts, colouring, group, settings, [&](const Pack& missing, const Pack& loss) {
+            sum += {missing.largest(), loss.sum()};
+          });
         });
       };
       // Lone contacts are right after one sweep.
       Opened opened = detail::sumOverParts(0, colouring.loneCount(), Opened{}, open);
-      opened += detail::sumOverColourParts(colouring, Opened{}, open);
-      report.residual = opened.largest;
+      opened += detail::sumOverLargeParts(colouring, Opened{}, open);
+      report.residual = std::max<S>(opened.largest, ofIslands.largest);
       report.loss += opened.loss;
-      ++report.iterations;
-      if (report.iterations % patience == 0) {
-        falls = report.residual < before;
-        before = report.residual;
-      }
-    } while (report.residual > enough && falls && report.iterations < settings.maxIterations);
+      goesOn = course.goesOn(opened.largest);
+    }
+    report.loss += ofIslands.loss;
+    report.iterations = std::max(course.sweeps, ofIslands.sweeps);
     move(colouring, bodies);
     detail::giveBack(shifts_);
     detail::giveBack(deep_);
@@ -138,21 +97,110 @@ class PositionalCorrection {
 
  private:
   using Group = detail::RowGroup<S>;
+  using Pack = detail::Packed<S>;
   using Body = detail::ShiftedBody<S>;
   using Bodies = detail::ShiftedLanes<S>;
   static constexpr std::size_t chunk = 512;
   static constexpr int patience = 20;  ///< sweeps; where moves are no less after them, there is no room
 
-  /// What a sweep did.
+  /// What a sweep did, or sweeps over islands; of `largest` the last one.
   struct Opened {
     S largest = S(0);
     S loss = S(0);
+    int sweeps = 0;
     Opened& operator+=(const Opened& other) {
       largest = std::max<S>(largest, other.largest);
       loss += other.loss;
+      sweeps = std::max(sweeps, other.sweeps);
       return *this;
     }
   };
+
+  /// Sweeps until the largest move is right, or falls no more.
+  struct Course {
+    S enough = S(0);
+    int most = 1;
+    int sweeps = 0;
+    S before = Eigen::NumTraits<S>::highest();  ///< largest move of the last sweep that was looked at
+
+    bool goesOn(const S& largest) {
+      ++sweeps;
+      bool falls = true;
+      if (sweeps % patience == 0) {
+        falls = largest < before;
+        before = largest;
+      }
+      return largest > enough && falls && sweeps < most;
+    }
+  };
+
+  struct Island {
+    std::uint32_t rows = 0;
+    S overlap = S(0);
+    S radius = Eigen::NumTraits<S>::highest();
+    S right = S(0);
+    Course course;
+    Opened now;
+    bool ended = false;
+  };
+
+  /// Opens the contacts of small islands.
+  [[gnu::flatten]] Opened openBundle(std::span<const Contact<S>> contacts, const ContactColoring& colouring,
+                                     std::size_t bundle, const CorrectionSettings<S>& settings) {
+    const std::uint32_t first = colouring.islands().firstOf(bundle);
+    std::vector<Island> islands(colouring.islands().firstOf(bundle + 1) - first);
+    const auto islandOf = [&](std::size_t k) -> Island& { return islands[colouring.islandOf(k) - first]; };
+    const auto colours = colouring.coloursOf(bundle);
+    for (std::size_t k = colours.front().begin; k < colours.back().end; ++k) {
+      const ContactColoring::Row& place = colouring.rows()[k];
+      Island& island = islandOf(k);
+      ++island.rows;
+      island.overlap = std::max<S>(island.overlap, S(-contacts[place.contact].gap));
+      island.radius = std::min<S>(
+          island.radius, detail::smallerRadius<S>(shifts_[place.slot1].radius, shifts_[place.slot2].radius));
+    }
+    std::size_t left = 0;
+    for (Island& island : islands) {
+      island.right = settings.precision * island.radius;
+      island.ended = !(island.overlap > island.right);
+      left += island.ended ? 0U : 1U;
+      island.course = {std::max<S>(settings.tolerance * island.overlap, island.right),
+                       settings.islandLooks > 0 ? sweepsOfLooks(island.rows, settings.islandLooks)
+                                                : settings.maxIterations};
+    }
+    for (std::size_t k = colours.front().begin; k < colours.back().end && left > 0; ++k) {
+      watch_.enterFirst(k, !(-contacts[colouring.rows()[k].contact].gap > islandOf(k).right / S(4)));
+    }
+    Opened all;
+    while (left > 0) {
+      for (Island& island : islands) {
+        island.now = {};
+      }
+      for (const ContactColoring::Part& colour : colours) {
+        const auto stale = [&](std::size_t k) {
+          const ContactColoring::Row& place = colouring.rows()[k];
+          const Island& island = islandOf(k);
+          return !island.ended && watch_.isStale(k, place.slot1, place.slot2, S(island.course.enough / S(2)));
+        };
+        detail::forGroupsOf<S>(colouring, colour.begin, colour.end, stale, [&](const Group& group) {
+          openAll(contacts, colouring, group, settings, [&](const Pack& missing, const Pack& loss) {
+            for (std::size_t lane = 0; lane < group.count; ++lane) {
+              islandOf(group.row[lane]).now += {missing[lane], loss[lane]};
+            }
+          });
+        });
+      }
+      for (Island& island : islands) {
+        all.loss += island.now.loss;
+        if (!island.ended && !island.course.goesOn(island.now.largest)) {
+          all += {island.now.largest, S(0), island.course.sweeps};
+          island.ended = true;
+          --left;
+        }
+      }
+    }
+    return all;
+  }
 
   template <class B>
   void takeUp(const ContactColoring& colouring, const B& bodies) {
@@ -197,10 +245,10 @@ class PositionalCorrection {
     });
   }
 
-  /// Opens the contacts of these rows.
+  /// Opens the contacts of these rows. \param tell  called with what was missing [m], and lost [J]
+  template <class Tell>
   [[gnu::flatten]] void openAll(std::span<const Contact<S>> contacts, const ContactColoring& colouring,
-                                const Group& group, const CorrectionSettings<S>& settings, Opened& sum) {
-    using Pack = detail::Packed<S>;
+                                const Group& group, const CorrectionSettings<S>& settings, Tell&& tell) {
     const Pack zero = Pack::zero();
     const auto contact = detail::OverlapLanes<S>::load(contacts, colouring.rows(), group);
     Bodies b1 = Bodies::load(shifts_, group.slot1);
@@ -223,7 +271,7 @@ class PositionalCorrection {
       }
       watch_.enter(group.row[lane], group.slot1[lane], group.slot2[lane]);
     }
-    sum += {opened.missing.largest(), opened.loss.sum()};
+    tell(opened.missing, opened.loss);
   }
 
   std::vector<Body> shifts_;  ///< by slot; the last one is the boundary

@@ -5,7 +5,6 @@
 
 #include <gravel/contact/contact_coloring.hpp>
 #include <gravel/contact/row_watch.hpp>
-#include <gravel/contact/solver_islands.hpp>
 #include <gravel/contact/solver_rows.hpp>
 #include <gravel/contact/turning_pair.hpp>
 #include <gravel/core/packed.hpp>
@@ -62,9 +61,8 @@ class ProblemBodies {
   using Scales = ProblemScales<S>;
 
   template <class B>
-  void gatherBodies(const B& source, const ContactColoring& colouring, const SolverIslands& islands,
-                    const S& ratio) {
-    findFalls(source, colouring, islands);
+  void gatherBodies(const B& source, const ContactColoring& colouring, const S& ratio) {
+    findFalls(source, colouring);
     const std::size_t n = colouring.bodies().size();
     resizeSparingly(bodies, n + 1);
     resizeSparingly(initial, n + 1);
@@ -72,7 +70,7 @@ class ProblemBodies {
     // Mostly nothing was to be scaled, and so it goes on: one look at a body is enough.
     const bool plain = speedExponent_ == 0 && massExponent_ == 0;
     const Scales scales = orderedSum(n, chunk, Scales{}, [&](std::size_t begin, std::size_t end) {
-      return gatherPart(source, colouring, islands, ratio, plain, begin, end);
+      return gatherPart(source, colouring, ratio, plain, begin, end);
     });
     turns_ = scales.mostTurn > turningShare<S>() * scales.leastFall;
     const bool wasAgain = again;
@@ -100,7 +98,7 @@ class ProblemBodies {
       const Vector3<S> dv = start.v;
       const Vector3<S> ds = start.s;
       if (plain) {
-        b = take(source, colouring, islands, slot);
+        b = take(source, colouring, slot);
       }
       b.v = scaled<S>(b.v, speedExponent_);
       b.s = scaled<S>(b.s, speedExponent_);
@@ -134,12 +132,11 @@ class ProblemBodies {
   /// Of slots [begin, end) what gatherBodies() begins with. \param plain  it is thought that nothing is to be
   /// scaled
   template <class B>
-  [[gnu::flatten]] Scales gatherPart(const B& source, const ContactColoring& colouring,
-                                     const SolverIslands& islands, const S& ratio, bool plain,
-                                     std::size_t begin, std::size_t end) {
+  [[gnu::flatten]] Scales gatherPart(const B& source, const ContactColoring& colouring, const S& ratio,
+                                     bool plain, std::size_t begin, std::size_t end) {
     Scales part;
     for (std::size_t slot = begin; slot < end; ++slot) {
-      Body now = take(source, colouring, islands, slot);
+      Body now = take(source, colouring, slot);
       part += {std::max<S>(maxAbs(now.v), maxAbs(now.s)), S(0), now.inverseMass, now.inverseMass};
       if (now.inverseMass > S(0)) {
         part.leastFall = std::min<S>(part.leastFall, initial[slot].fall);
@@ -216,7 +213,8 @@ class ProblemBodies {
 
   /// One after the other, in the order of slots. O(bodies) where islands are free.
   template <class B>
-  void findFalls(const B& source, const ContactColoring& colouring, const SolverIslands& islands) {
+  void findFalls(const B& source, const ContactColoring& colouring) {
+    const SolverIslands& islands = colouring.islands();
     if (!islands.areFree()) {
       return;
     }
@@ -236,8 +234,7 @@ class ProblemBodies {
 
   /// A body with its mass in place of its inverse, until the scale of masses is known.
   template <class B>
-  Body take(const B& source, const ContactColoring& colouring, const SolverIslands& islands,
-            std::size_t slot) {
+  Body take(const B& source, const ContactColoring& colouring, std::size_t slot) {
     const std::uint32_t i = colouring.bodies()[slot];
     Body b;
     const bool movable = colouring.movable(static_cast<std::uint32_t>(slot));
@@ -247,8 +244,8 @@ class ProblemBodies {
     b.s = friction ? Vector3<S>(r * spinOf(source, i)) : Vector3<S>(Vector3<S>::Zero());
     Vector3<S> a = accelerationOf(source, colouring, slot);
     Vector3<S> bend = bendAt(colouring, slot);
-    if (movable && islands.areFree()) {
-      const IslandFall& common = common_[islands.of(static_cast<std::uint32_t>(slot))];
+    if (movable && colouring.islands().areFree()) {
+      const IslandFall& common = common_[colouring.islands().of(static_cast<std::uint32_t>(slot))];
       a -= common.a;
       bend -= common.bend;
     }

@@ -1,9 +1,10 @@
 #pragma once
 
 /// \file
-/// Friction, and resistance to rolling and spinning, of one row of a ContactProblem while all others stand.
+/// Rows of a ContactProblem made right while all others stand.
 
-#include <gravel/contact/contact_problem.hpp>
+#include <gravel/contact/sweep_course.hpp>
+#include <gravel/contact/sweep_momentum.hpp>
 
 namespace gravel::detail {
 
@@ -14,23 +15,68 @@ struct RowImpulses {
   using Group = RowGroup<S>;
   using Lanes = RowLanes<S>;
 
-  /// What a sweep did: largest change of a velocity, squared; and the square, over mass, of the changes of
-  /// the impulses.
-  struct Progress {
-    S change_sq = S(0);
-    S size = S(0);
-    S along = S(0);           ///< the same product of these changes and the steps of the sweep before
-    std::size_t changed = 0;  ///< rows by more than they may
-    std::size_t looked = 0;   ///< rows that were not passed over
-    Progress& operator+=(const Progress& other) {
-      change_sq = std::max<S>(change_sq, other.change_sq);
-      size += other.size;
-      along += other.along;
-      changed += other.changed;
-      looked += other.looked;
-      return *this;
+  using Pack = Packed<S>;
+  using Progress = SweepProgress<S>;
+  using Momentum = SweepMomentum<S>;
+
+  /// How a sweep goes: nothing beside; bodies that move and rows that are right are watched; or on from the
+  /// last step, by a share of it.
+  enum class Way { Bare, Watched, Coasting };
+
+  /// First on along the last step, then to where these contacts are right.
+  /// \param all  impulses of all rows are those of this problem
+  /// \param share by lane, of the last step \param tell  called with SweepProgress::change_sq, size and along
+  template <Way way, class Tell>
+  [[gnu::always_inline]] static inline void relax(ContactProblem<S>& problem, const Group& group, bool all,
+                                                  Momentum& momentum, const Pack& share, Tell&& tell) {
+    Lanes row = problem.load(group, all);
+    auto b1 = BodyLanes<S>::load(problem.bodies, group.slot1);
+    auto b2 = BodyLanes<S>::load(problem.bodies, group.slot2);
+    typename Momentum::Step step, last;
+    if constexpr (way == Way::Coasting) {
+      last = momentum.load(group);
+      step = share * last;
+      row.jn = row.jn + step.n;
+      row.jt = row.jt + step.t;
+      row.l = row.l + step.l;
     }
-  };
+    const RowChanges<S> changes = problem.change(group, row, b1, b2);
+    push(b1, b2, changes.dj * row.n + changes.dt);
+    if (problem.friction) {
+      if (problem.grips) {
+        mark(problem, group, changes, problem.atOnce);
+      }
+      twist(row, b1, b2, changes.dt);
+    }
+    TurningChanges<S> turned;
+    if (!problem.turning.empty()) {
+      turned = TurningLanes<S>::load(problem.turning, group).resist(row, b1, b2);
+      turn(b1, b2, turned);
+    }
+    b1.store(problem.bodies, group.slot1, problem.friction);
+    b2.store(problem.bodies, group.slot2, problem.friction);
+    problem.storeImpulses(group, row);
+    const Pack change_sq = largerOf(changes.change_sq(), turned.d_rho.squaredNorm());
+    const Pack size =
+        changes.dj * changes.approach + changes.dt.dot(changes.du) + turned.dl.dot(turned.d_rho);
+    if constexpr (way == Way::Coasting) {
+      tell(change_sq, size, last.n * changes.approach + last.t.dot(changes.du) + last.l.dot(turned.d_rho));
+      momentum.store(group, step + typename Momentum::Step{changes.dj, changes.dt, turned.dl});
+    } else {
+      tell(change_sq, size, Pack::zero());
+    }
+    if constexpr (way == Way::Watched) {
+      const Pack push_t = changes.dt.sumAbs();  // |its part across n|, or more
+      const Pack push = sizeOf(changes.dj) + push_t;
+      watchMoves(problem, group.slot1, b1,
+                 b1.inverseMass * push + row.c1 * b1.spin * push_t + turned.ds1.sumAbs());
+      watchMoves(problem, group.slot2, b2,
+                 b2.inverseMass * push + row.c2 * b2.spin * push_t + turned.ds2.sumAbs());
+      for (std::size_t lane = 0; lane < group.count; ++lane) {
+        problem.watch.enter(group.row[lane], group.slot1[lane], group.slot2[lane]);
+      }
+    }
+  }
 
   /// Takes down which rows are at the limit of friction now. \param atOnce  that is to slide
   [[gnu::always_inline]] static inline void mark(ContactProblem<S>& problem, const Group& group,

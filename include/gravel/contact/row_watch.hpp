@@ -50,7 +50,11 @@ class RowWatch {
   void enterFirst(std::size_t k, bool isRight) { then_[k] = isRight ? S(0) : S(-1); }
 
   bool isStale(std::size_t k, std::uint32_t slot1, std::uint32_t slot2) const {
-    return then_[k] < S(0) || ways_[slot1] + ways_[slot2] > then_[k] + still_;
+    return isStale(k, slot1, slot2, still_);
+  }
+  /// Of contacts that are right to something else.
+  bool isStale(std::size_t k, std::uint32_t slot1, std::uint32_t slot2, const S& still) const {
+    return then_[k] < S(0) || ways_[slot1] + ways_[slot2] > then_[k] + still;
   }
 
   /// Whether every row was right when it was entered, and every move since is known: what comes next may

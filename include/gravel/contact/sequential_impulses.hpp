@@ -7,8 +7,7 @@
 /// friction, a vector of the tangent plane, within Coulomb's cone.
 
 #include <gravel/contact/contact_energy.hpp>
-#include <gravel/contact/row_impulses.hpp>
-#include <gravel/contact/sweep_momentum.hpp>
+#include <gravel/contact/island_sweeps.hpp>
 
 namespace gravel {
 
@@ -31,17 +30,14 @@ namespace gravel {
 template <Real S>
 class SequentialImpulses : private detail::RowImpulses<S> {
   using Base = detail::RowImpulses<S>;
-  using Base::mark;
   using Base::resist;
   using Base::rub;
-  using Base::watchMoves;
   using typename Base::Body;
   using typename Base::Group;
-  using typename Base::Lanes;
   using typename Base::Progress;
   using typename Base::Row;
+  using typename Base::Way;
   using Pack = detail::Packed<S>;
-  using Step = typename detail::SweepMomentum<S>::Step;
 
  public:
   static constexpr const char* name() { return "sequential impulses"; }
@@ -51,7 +47,6 @@ class SequentialImpulses : private detail::RowImpulses<S> {
   /// \return iterations and residual; the caller adds the rest
   ContactReport<S> solve(ContactProblem<S>& problem, const ContactColoring& colouring,
                          const ContactSettings<S>& settings) {
-    using std::sqrt;
     ContactReport<S> report;
     problem.watch.setHolds(false);
     detail::sumOverParts(0, colouring.loneCount(), Progress{},
@@ -60,23 +55,43 @@ class SequentialImpulses : private detail::RowImpulses<S> {
                              strike(problem, colouring, k);
                            }
                          });
-    report.looks = colouring.loneCount();
-    if (colouring.loneCount() == problem.rows.size()) {
-      report.iterations = 1;  // exact
-      return report;
+    detail::resizeSparingly(places_, colouring.bundles() > 0 ? problem.bodies.size() : 0);
+    detail::IslandReport<S> sum{1, colouring.loneCount()};
+    sum += orderedSum(colouring.bundles(), 1, detail::IslandReport<S>{},
+                      [&](std::size_t bundle, std::size_t /*next*/) {
+                        return detail::IslandSweeps<S>(problem, colouring, bundle, settings, places_).solve();
+                      });
+    if (colouring.islandsEnd() < problem.rows.size()) {
+      sum += solveLarge(problem, colouring, settings);
+    }
+    report.iterations = sum.iterations;
+    report.looks = sum.looks;
+    report.residual = sum.residual;
+    return report;
+  }
+
+ private:
+  static constexpr std::size_t few = 8;  ///< one contact in so many
+
+  /// All but lone contacts and small islands, together.
+  detail::IslandReport<S> solveLarge(ContactProblem<S>& problem, const ContactColoring& colouring,
+                                     const ContactSettings<S>& settings) {
+    using std::sqrt;
+    const std::size_t first = colouring.islandsEnd();
+    const std::size_t count = problem.rows.size() - first;
+    if (!(problem.largestApproach > S(0))) {
+      problem.release(colouring, first, problem.rows.size());
+      return {};
     }
     const S rounding = S(8) * Eigen::NumTraits<S>::epsilon();
     const S enough = std::max<S>(settings.tolerance, rounding) * problem.largestApproach;
-    const std::size_t count = problem.rows.size() - colouring.loneCount();
     // What is only just content would never become better, and a heap at rest creep by it.
     const S right = enough / S(16);
     if (problem.again && !(problem.wrong_sq > right * right)) {
-      report.iterations = 1;  // one that would change nothing
-      report.looks += problem.looks;
       problem.kept = problem.passes;
       problem.watch.setHolds(problem.passes);
-      report.residual = sqrt(problem.wrong_sq) / problem.largestApproach;
-      return report;
+      // One that would change nothing.
+      return {1, problem.looks, S(sqrt(problem.wrong_sq) / problem.largestApproach)};
     }
     const bool accelerate = settings.accelerate && settings.maxIterations > 2;
     bool local = problem.passes;
@@ -86,67 +101,37 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       problem.watch.begin(problem.bodies.size(), problem.rows.size(), S(enough / S(2)));
     }
     bool watched = true;  // all that moves bodies
-    S beta = S(0);        // what a sweep begins with: this share of the step of the one before
-    S before = S(0);      // square of the changes of that
-    bool bare = false;    // that one had no share
+    detail::SweepCourse<S> course(enough, settings.maxIterations);
+    std::size_t looks = 0;
     while (true) {
-      const bool alone = local || report.iterations == 0 || !accelerate;  // without momentum
-      const Progress now = sweep(problem, colouring, local, alone, beta);
+      const bool alone = local || course.sweeps() == 0 || !accelerate;  // without momentum
+      const Progress now = sweep(problem, colouring, local, alone, course.share());
       watched = watched && alone;
-      ++report.iterations;
-      report.looks += local ? now.looked : count;
-      const S change = sqrt(now.change_sq);
-      report.residual = change / problem.largestApproach;
-      const bool ends = !(change > enough);
-      const bool last = report.iterations >= settings.maxIterations;
-      const bool half = report.iterations == settings.maxIterations - settings.maxIterations / 2;
-      // A slip that goes back by a share of itself a sweep is many changes long, and will be none. With half
-      // of the sweeps gone there is no time to wait for that. See docs/theory-contact.md, "Who slides".
-      const S lasts = S(ends ? 32 : 4) * change;
-      const bool more = !last && (ends || half) && problem.letSlide(colouring, lasts);
-      if (last || (ends && !more)) {
-        problem.watch.setHolds(watched && ends);
+      looks += local ? now.looked : count;
+      const bool more = course.take(now) && problem.letSlide(colouring, course.slides());
+      if (!course.goesOn(more)) {
+        problem.watch.setHolds(watched && course.isRight());
         momentum_.end();
-        return report;
+        return {course.sweeps(), looks, S(course.change() / problem.largestApproach)};
       }
-      local = local || (report.iterations == 1 && now.changed < count / few);
+      local = local || (course.sweeps() == 1 && now.changed < count / few);
       if (local) {
-        local = report.looks < 2 * problem.rows.size();
+        local = looks < 2 * count;
         if (!local && problem.passes) {
           problem.recall(colouring);
           problem.passes = false;
         }
         if (!local && accelerate) {
-          momentum_.begin(problem);
+          momentum_.begin(problem, first);
         }
-      } else if (accelerate && report.iterations == 1) {
-        momentum_.begin(problem);
-        before = more ? S(0) : now.size;
+      } else if (accelerate && course.sweeps() == 1) {
+        momentum_.begin(problem, first);
+        course.begin(now, more);
       } else if (accelerate) {
-        const S next = more ? S(0) : shareAfter(now, before, beta, bare);
-        bare = !more && beta == S(0);
-        beta = next;
-        before = more ? S(0) : now.size;
-        momentum_.coast(problem, beta);
+        course.goOn(now, more);
+        momentum_.coast(problem, course.share());
       }
     }
-  }
-
- private:
-  static constexpr std::size_t few = 8;  ///< one contact in so many
-
-  /// The share of a sweep's step with which the next one begins.
-  /// \param beta  the sweep's own \param before  square of the changes of the one before
-  /// \param bare  that one had no share
-  static S shareAfter(const Progress& now, const S& before, const S& beta, bool bare) {
-    if (beta < S(0)) {
-      return S(0);  // to see whether sweeps still turn back
-    }
-    if (beta == S(0) && now.along < S(0)) {
-      return bare ? S(now.along / (before - now.along)) : S(0);
-    }
-    // At high mass ratios changes fall by less than their rounding: that is no reason to begin anew.
-    return now.size < S(1.001) * before ? std::min<S>(S(1), now.size / before) : S(0);
   }
 
   /// A contact alone: in two strokes, stop and rebound, so that a head-on blow ends at exactly its target.
@@ -190,11 +175,12 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     }
   }
 
-  /// Once over all rows, or over those whose ends do not stand nearly as they did when they were right.
+  /// Once over the rows of large islands, or over those whose ends do not stand nearly as they did when they
+  /// were right.
   /// \param watched goes without momentum, and rows may be passed over afterwards
   Progress sweep(ContactProblem<S>& problem, const ContactColoring& colouring, bool local, bool watched,
-                 const S& beta) {
-    return detail::sumOverColourParts(
+                 const S& share) {
+    return detail::sumOverLargeParts(
         colouring, Progress{}, [&](std::size_t begin, std::size_t end, Progress& sum) {
           if (local) {
             const auto stale = [&](std::size_t k) {
@@ -202,72 +188,35 @@ class SequentialImpulses : private detail::RowImpulses<S> {
               return problem.watch.isStale(k, ends.slot1, ends.slot2);
             };
             detail::forGroupsOf<S>(colouring, begin, end, stale, [&](const Group& group) {
-              relax<true>(problem, group, S(0), sum);
+              relax<Way::Watched>(problem, group, S(0), sum);
               sum.looked += group.count;
             });
           } else {
             problem.forGroups(colouring, begin, end, [&](const Group& group) {
-              watched ? relax<true>(problem, group, S(0), sum) : relax<false>(problem, group, beta, sum);
+              watched ? relax<Way::Watched>(problem, group, S(0), sum)
+                      : relax<Way::Coasting>(problem, group, share, sum);
             });
           }
         });
   }
 
-  /// First on along the last step (none while it is watched), then to where these contacts are right.
-  template <bool Watched>
-  [[gnu::flatten]] void relax(ContactProblem<S>& problem, const Group& group, const S& beta, Progress& sum) {
-    Lanes row = problem.load(group, !problem.passes);
-    auto b1 = detail::BodyLanes<S>::load(problem.bodies, group.slot1);
-    auto b2 = detail::BodyLanes<S>::load(problem.bodies, group.slot2);
-    Step step, last;
-    if constexpr (!Watched) {
-      last = momentum_.load(group);
-      step = beta * last;
-      row.jn = row.jn + step.n;
-      row.jt = row.jt + step.t;
-      row.l = row.l + step.l;
-    }
-    const detail::RowChanges<S> changes = problem.change(group, row, b1, b2);
-    push(b1, b2, changes.dj * row.n + changes.dt);
-    if (problem.friction) {
-      if (problem.grips) {
-        mark(problem, group, changes, problem.atOnce);
-      }
-      twist(row, b1, b2, changes.dt);
-    }
-    detail::TurningChanges<S> turned;
-    if (!problem.turning.empty()) {
-      turned = detail::TurningLanes<S>::load(problem.turning, group).resist(row, b1, b2);
-      turn(b1, b2, turned);
-    }
-    b1.store(problem.bodies, group.slot1, problem.friction);
-    b2.store(problem.bodies, group.slot2, problem.friction);
-    problem.storeImpulses(group, row);
-    Progress progress;
-    const Pack change_sq = largerOf(changes.change_sq(), turned.d_rho.squaredNorm());
-    progress.change_sq = change_sq.largest();
-    progress.size =
-        (changes.dj * changes.approach + changes.dt.dot(changes.du) + turned.dl.dot(turned.d_rho)).sum();
-    if constexpr (!Watched) {
-      progress.along = (last.n * changes.approach + last.t.dot(changes.du) + last.l.dot(turned.d_rho)).sum();
-      momentum_.store(group, step + Step{changes.dj, changes.dt, turned.dl});
-    } else {
-      const Pack push_t = changes.dt.sumAbs();  // |its part across n|, or more
-      const Pack push = sizeOf(changes.dj) + push_t;
-      watchMoves(problem, group.slot1, b1,
-                 b1.inverseMass * push + row.c1 * b1.spin * push_t + turned.ds1.sumAbs());
-      watchMoves(problem, group.slot2, b2,
-                 b2.inverseMass * push + row.c2 * b2.spin * push_t + turned.ds2.sumAbs());
-      const S still_sq = problem.watch.still() * problem.watch.still();
-      for (std::size_t lane = 0; lane < group.count; ++lane) {
-        problem.watch.enter(group.row[lane], group.slot1[lane], group.slot2[lane]);
-        progress.changed += change_sq[lane] > still_sq ? 1U : 0U;
-      }
-    }
-    sum += progress;
+  template <Way way>
+  [[gnu::flatten]] void relax(ContactProblem<S>& problem, const Group& group, const S& share, Progress& sum) {
+    Base::template relax<way>(problem, group, !problem.passes, momentum_, Pack::all(share),
+                              [&](const Pack& change_sq, const Pack& size, const Pack& along) {
+                                Progress progress{change_sq.largest(), size.sum(), along.sum()};
+                                if constexpr (way == Way::Watched) {
+                                  const S still_sq = problem.watch.still() * problem.watch.still();
+                                  for (std::size_t lane = 0; lane < group.count; ++lane) {
+                                    progress.changed += change_sq[lane] > still_sq ? 1U : 0U;
+                                  }
+                                }
+                                sum += progress;
+                              });
   }
 
   detail::SweepMomentum<S> momentum_;
+  std::vector<std::uint32_t> places_;  ///< of IslandSweeps
 };
 
 }  // namespace gravel

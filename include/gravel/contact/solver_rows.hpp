@@ -118,6 +118,22 @@ struct RowMark {
   static constexpr std::uint8_t patience = 8;
 };
 
+/// What rows ask for.
+template <Real S>
+struct RowNeeds {
+  S approach = S(0);      ///< largest change of a normal velocity, of those of large islands
+  S wrong_sq = S(0);      ///< largest change that a sweep would make, squared, of those looked at
+  std::size_t looks = 0;  ///< how many that was found for
+  S any = S(0);           ///< largest change of a normal velocity, of all
+  RowNeeds& operator+=(const RowNeeds& other) {
+    looks += other.looks;
+    approach = std::max<S>(approach, other.approach);
+    wrong_sq = std::max<S>(wrong_sq, other.wrong_sq);
+    any = std::max<S>(any, other.any);
+    return *this;
+  }
+};
+
 /// 1/x; 0 of 0. Not `inverse`, a name by which Eigen would take its own scalars for arrays.
 template <Real S>
 S reciprocal(const S& x) {

@@ -20,8 +20,7 @@ class SweepMomentum {
     Packed<S> n = Packed<S>::zero();
     PackedVector<S> t = PackedVector<S>::zero();
     PackedVector<S> l = PackedVector<S>::zero();  ///< against turning
-    [[gnu::always_inline]] friend inline Step operator*(const S& beta, const Step& step) {
-      const Packed<S> by = Packed<S>::all(beta);
+    [[gnu::always_inline]] friend inline Step operator*(const Packed<S>& by, const Step& step) {
       return {by * step.n, by * step.t, by * step.l};
     }
     [[gnu::always_inline]] friend inline Step operator+(const Step& a, const Step& b) {
@@ -29,10 +28,19 @@ class SweepMomentum {
     }
   };
 
-  /// Steps are kept from here on, from none and from the present velocities.
-  void begin(const ContactProblem<S>& problem) {
-    steps_.assign(problem.rows.size(), Quad{});
-    turns_.assign(problem.turning.size(), Quad{});
+  /// Steps of rows [begin, end) are kept from here on, from none and from the present velocities of these
+  /// slots.
+  void begin(const ContactProblem<S>& problem, std::size_t begin, std::size_t end,
+             std::span<const std::uint32_t> slots) {
+    beginRows(problem, begin, end);
+    swept_.clear();
+    for (const std::uint32_t slot : slots) {
+      swept_.push_back(BodySwept{problem.bodies[slot].v, problem.bodies[slot].s});
+    }
+  }
+  /// Those of rows from `begin` on, and of all slots, by all threads.
+  void begin(const ContactProblem<S>& problem, std::size_t begin) {
+    beginRows(problem, begin, problem.rows.size());
     resizeAnew(swept_, problem.bodies.size());
     parallelFor(problem.bodies.size(), chunk, [&](std::size_t slot) {
       swept_[slot] = BodySwept{problem.bodies[slot].v, problem.bodies[slot].s};
@@ -47,19 +55,16 @@ class SweepMomentum {
   }
 
   /// Velocities follow the impulses beyond their last step, by this share: they are linear in the impulses.
-  void coast(ContactProblem<S>& problem, const S& beta) {
-    parallelFor(problem.bodies.size(), chunk, [&](std::size_t slot) {
-      BodySwept& last = swept_[slot];
-      SolverBody<S>& b = problem.bodies[slot];
-      const Vector3<S> dv = b.v - last.v;
-      last.v = b.v;
-      b.v += beta * dv;
-      if (problem.friction) {
-        const Vector3<S> ds = b.s - last.s;
-        last.s = b.s;
-        b.s += beta * ds;
-      }
-    });
+  void coast(ContactProblem<S>& problem, const S& share) {
+    parallelFor(problem.bodies.size(), chunk,
+                [&](std::size_t slot) { coast(problem, slot, swept_[slot], share); });
+  }
+  /// Those of the slots of begin(). \param shareOf  the number of a slot among them
+  template <class ShareOf>
+  void coast(ContactProblem<S>& problem, std::span<const std::uint32_t> slots, ShareOf&& shareOf) {
+    for (std::size_t i = 0; i < slots.size(); ++i) {
+      coast(problem, slots[i], swept_[i], shareOf(i));
+    }
   }
 
   [[gnu::always_inline]] inline Step load(const Group& group) const {
@@ -87,18 +92,37 @@ class SweepMomentum {
     Vector3<S> s;
   };
 
-  [[gnu::always_inline]] static inline PackedQuad<S> at(const std::vector<Quad>& all, const Group& group) {
-    return PackedQuad<S>::load([&](std::size_t lane) { return quadOf<S>(all[group.row[lane]], 0); });
+  void beginRows(const ContactProblem<S>& problem, std::size_t begin, std::size_t end) {
+    first_ = begin;
+    steps_.assign(end - begin, Quad{});
+    turns_.assign(problem.turning.empty() ? 0 : end - begin, Quad{});
   }
-  [[gnu::always_inline]] static inline void put(std::vector<Quad>& all, const Group& group,
-                                                const PackedQuad<S>& quad) {
-    quad.store([&](std::size_t lane) { return quadOf<S>(all[group.row[lane]], 0); },
+
+  static void coast(ContactProblem<S>& problem, std::size_t slot, BodySwept& last, const S& share) {
+    SolverBody<S>& b = problem.bodies[slot];
+    const Vector3<S> dv = b.v - last.v;
+    last.v = b.v;
+    b.v += share * dv;
+    if (problem.friction) {
+      const Vector3<S> ds = b.s - last.s;
+      last.s = b.s;
+      b.s += share * ds;
+    }
+  }
+
+  [[gnu::always_inline]] inline PackedQuad<S> at(const std::vector<Quad>& all, const Group& group) const {
+    return PackedQuad<S>::load([&](std::size_t lane) { return quadOf<S>(all[group.row[lane] - first_], 0); });
+  }
+  [[gnu::always_inline]] inline void put(std::vector<Quad>& all, const Group& group,
+                                         const PackedQuad<S>& quad) const {
+    quad.store([&](std::size_t lane) { return quadOf<S>(all[group.row[lane] - first_], 0); },
                [&](std::size_t lane) { return group.holds(lane); });
   }
 
-  std::vector<BodySwept> swept_;
-  std::vector<Quad> steps_;  ///< by row
-  std::vector<Quad> turns_;  ///< against turning, if anything resists that
+  std::size_t first_ = 0;         ///< row
+  std::vector<BodySwept> swept_;  ///< by slot, or by place among those of begin()
+  std::vector<Quad> steps_;       ///< by row
+  std::vector<Quad> turns_;       ///< against turning, if anything resists that
 };
 
 }  // namespace gravel::detail

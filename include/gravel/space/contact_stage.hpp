@@ -103,10 +103,10 @@ class ContactStage {
     const CorrectionSettings<Scalar> settings{
         .factor = config.positionalCorrectionFactor,
         .maxIterations = sweepsOfLooks(contacts_.size()),
+        .islandLooks = usualLooks,
         .keepAngularMomentum = domain.isOpen()};  // images have none to keep
     separationLoss_ = solver_.correctPositions(bodies, settings).loss;
-    moved_ = !solver_.displacements().empty();
-    if (moved_) {
+    if (moved_ = !solver_.displacements().empty(); moved_) {
       renewGeometry(bodies, config, time);
     }
   }
