@@ -252,12 +252,12 @@ class ImpactEvents : private detail::ImpactCourses<S> {
       return false;  // nothing presses them together, or they leave already, as fast as they would
     }
     const S speed = v_n < S(0) ? S(-v_n) : S(0);
-    // In a heap, where both already lean on others, what a step's fall brings is rest, along what holds them.
-    S threshold = scene.settings.restitutionThreshold;
-    if (leans_[event.first] != 0 && (boundary || leans_[event.second] != 0)) {
-      const S fall = scene.heldAlong(event.first, event.second, n);
-      threshold = std::max<S>(threshold, fall * h);
+    // In a heap, where both lean on others or stand, what a step's fall brings along what holds them is rest.
+    S fall(0);
+    if ((!one.movable || leans_[event.first] != 0) && (!two.movable || leans_[event.second] != 0)) {
+      fall = h * scene.heldAlong(event.first, event.second, n);
     }
+    const S threshold = std::max<S>(scene.settings.restitutionThreshold, fall);
     const bool bounces = speed > threshold && !bouncesNoMore(scene, event.first) &&
                          (boundary || !bouncesNoMore(scene, event.second));
     const S e = bounces ? restitutionAt(material, speed) : S(0);
@@ -310,7 +310,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
                         n,
                         distance,
                         {m * dv_n, m * dv_t, m * l, true},
-                        rests || !(bounce > S(0)),
+                        rests || !(bounce > fall),
                         rests && e < S(1) ? S(t + S(2) * e * speed / ((S(1) - e) * pull)) : t});
     remember(scene, e, report);
     return true;
