@@ -107,6 +107,56 @@ TEST_CASE("A gas of inelastic spheres cools by Haff's law") {
   CHECK_THAT(ledger.total(), WithinRel(750.0, 1e-12));
 }
 
+// Rough spheres, whose blows always stick, trade energy between flight and spin. With b the tangential
+// restitution, q = 2/5, y = (1 + b) q/(2 + 2 q) and Maxwell's distribution of both, the mean over blows at
+// the temperatures T of flight and W of spin gives (Huthmann & Zippelius 1997, Phys. Rev. E 56, R6275)
+//   dT/dt = -k ((1 - e^2)/4 + y (1 - y)) T + k (y^2/q) W,   k = (4/3) omega_0 sqrt(T),
+//   dW/dt = k (y^2/q) T - k (y/q) (1 - y/q) W.
+// Over ten seeds T and W scatter by 2 to 3.4 %, and their means are within 2.1 % of these; the tolerance is
+// 12 %. Seen to fail: blows have no tangential restitution.
+TEST_CASE(
+    "A gas of rough spheres shares its energy between flight and spin, and cools, as kinetic theory says") {
+  struct Row {
+    double restitution, tangential;
+  };
+  for (const Row& row : {Row{1.0, 1.0}, Row{0.9, 0.4}}) {
+    const double e = row.restitution;
+    const double b = row.tangential;
+    scenes::GasOptions options;
+    options.count = 1000;
+    options.fraction = 0.05;
+    options.restitution = e;
+    options.timeStep = 0.01;
+    Space<double> space = scenes::gasBox(options);
+    space.setCoeffStaticFriction(1e9);
+    space.setCoeffFriction(1e9);
+    space.setTangentialRestitution(b);
+    const double y = (1 + b) / 7;
+    double T = 1;
+    double W = 0;
+    const auto rates = [&](double flight, double spin) {
+      const double k = 4.0 / 3 * 0.77468 * std::sqrt(flight);
+      return std::pair{-k * ((1 - e * e) / 4 + y * (1 - y)) * flight + k * y * y / 0.4 * spin,
+                       k * y * y / 0.4 * flight - k * y / 0.4 * (1 - y / 0.4) * spin};
+    };
+    for (const double time : {5.0, 25.0}) {
+      while (space.time() < time - 1e-9) {
+        space.computeDynamics(space.steps());
+        const double h = options.timeStep;
+        const auto first = rates(T, W);
+        const auto middle = rates(T + h / 2 * first.first, W + h / 2 * first.second);
+        T += h * middle.first;
+        W += h * middle.second;
+      }
+      const EnergyLedger<double> ledger = space.energyLedger();
+      CAPTURE(e, b, time, T, W);
+      CHECK_THAT(ledger.kinetic / 1500, WithinRel(T, 0.12));
+      CHECK_THAT(ledger.rotational / 1500, WithinRel(W, 0.12));
+      CHECK_THAT(e < 1 ? ledger.total() : ledger.mechanical(), WithinRel(1500.0, 1e-12));
+    }
+  }
+}
+
 // Below e = 7 - 4 sqrt 3 three balls on a line hit each other infinitely often in a finite time (Bernu &
 // Mazighi 1990; McNamara & Young 1992). The steps must go on, and the balls end together.
 TEST_CASE("Inelastic collapse of three balls on a line ends") {
