@@ -191,6 +191,32 @@ TEST_CASE(
   CHECK_THAT(space.body(0).angularVelocity()[2], WithinRel(w, 1e-4));
 }
 
+// A ball that rolls down over fixed balls is moved off them in steps so long, and slowed as it is moved. Two
+// that can move share that in opposite directions; here nothing has the other part. Seen to fail by 7.0e-5 J:
+// what it takes from the work of the kick that follows was not booked.
+TEST_CASE(
+    "What takes overlap with fixed balls away leaves the ledger of a field closed, in parts of a step too") {
+  for (const int parts : {1, 3}) {
+    SimulationConfig<double> config = plain(0.01 * parts);
+    config.coeffRestitution = 0;
+    config.coeffFriction = config.coeffStaticFriction = 1;
+    config.contactSubsteps = parts;
+    Space<double> space(config);
+    space.setUniformField({0.98, 0, -9.76});
+    for (int k = 0; k <= 100; ++k) {
+      Body<double> bump = ball({0.04 * k, 0, 0}, {0, 0, 0}, 0.05);
+      bump.fixed = true;
+      space.addBody(bump);
+    }
+    space.addBody(ball({0, 0, 0.15}, {0.8, 0, 0}, 0.1, 1.0, {0, 8, 0}));
+    const double start = space.energyLedger().total();
+    space.advanceTo(3.0);
+    CAPTURE(parts);
+    CHECK(space.energyLedger().correction < -1e-3);
+    CHECK_THAT(space.energyLedger().total(), WithinAbs(start, 1e-11));
+  }
+}
+
 // Seen to fail by 2.41 J and 0.03 J, of first order in the step: the work was that of speeds before the
 // contacts of the step's end were solved, and the kick's share of the first half's impulses was that of
 // gravity and field alone.

@@ -45,11 +45,12 @@ void validate(const CorrectionSettings<S>& settings) {
   }
 }
 
-/// A body that was moved, and by how much [m].
+/// A body that was moved.
 template <Real Scalar>
 struct Displacement {
   std::uint32_t body;
-  Vector3<Scalar> shift;
+  Vector3<Scalar> shift;   ///< [m]
+  Vector3<Scalar> change;  ///< [m s^-1] of its velocity, for angular momentum's sake
 };
 
 template <Real Scalar>

@@ -236,7 +236,8 @@ class PositionalCorrection {
         if (hasMoved(slot)) {
           const std::uint32_t i = colouring.bodies()[slot];
           positions[i] += shifts_[slot].d;
-          moved_[place++] = {i, shifts_[slot].d};
+          const Vector3<S> v = velocities[i];
+          moved_[place++] = {i, shifts_[slot].d, Vector3<S>(shifts_[slot].v - v)};
           if (shifts_[slot].v != velocities[i]) {
             velocities[i] = shifts_[slot].v;
           }

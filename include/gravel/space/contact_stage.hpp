@@ -112,8 +112,8 @@ class ContactStage {
   }
 
   /// Energy that moving bodies apart took [J]: F.d by the forces at the new places, exact to the square of
-  /// the displacement d, and what it took of their motion.
-  Scalar separationWork(const ForceStage<Scalar, Layout>& force, const Bodies& bodies) const;
+  /// the displacement d, what it took of their motion, and its share of the kick [s] that follows.
+  Scalar separationWork(const ForceStage<Scalar, Layout>& force, const Bodies& bodies, Scalar kick) const;
 
   /// Solves all contacts together on the present velocities. Adds to the report of the step.
   /// \param h [s] length of the step \param drifts  the drift of the step follows

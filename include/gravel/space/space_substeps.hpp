@@ -173,7 +173,7 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
     }
   }
   rememberPlaces();
-  left_.correction += contact_.separationWork(force_, bodies_);
+  left_.correction += contact_.separationWork(force_, bodies_, Scalar(contact_dt_ / Scalar(2)));
   if (!held) {
     contact_.makeUpBlows(bodies_, Scalar(time_ + end), apart ? contact_dt_ : h);
   }
