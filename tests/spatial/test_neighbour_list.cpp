@@ -118,6 +118,22 @@ TEST_CASE("a list is searched anew when, and only when, something made it stale,
   CHECK(update(1.0).empty());
 }
 
+TEST_CASE("pairs that are left out stay out until the next search") {
+  const auto cloud = randomCloud<double>(200, 1.0, 0.2, 1.0, 55);
+  const auto open = Domain<double>::open();
+  NeighbourList<double> list;
+  const auto even = [](const Pair& pair) { return pair.first % 2 == 0 && pair.second % 2 == 0; };
+  const auto update = [&] { return list.update(cloud.positions, cloud.radii, cloud.ids, 0, open, 0.0); };
+  std::vector<Pair> expected = update();
+  const std::vector<Pair> all = expected;
+  REQUIRE(std::erase_if(expected, even) > 100);
+  list.leaveOut(even, cloud.ids);
+  CHECK(list.pairs() == expected);
+  CHECK(update() == expected);
+  list.clear();
+  CHECK(update() == all);
+}
+
 TEST_CASE("a body that teleports into another is a pair at once") {
   Cloud<double> cloud = randomCloud<double>(100, 100.0, 0.05, 1.0, 54);
   NeighbourList<double> list;

@@ -276,12 +276,12 @@ class ContactStage {
 
   /// contacts() by name.
   std::span<const ContactName> names();
-
   /// Who came to rest in the step, sorted.
   std::span<const ContactKeys> settled();
 
   std::vector<HalfSpace<Scalar>> walls_;
   NeighbourList<Scalar> neighbours_;
+  std::vector<std::uint32_t> fixed_;  // at its last search: it has no pairs of these
   BoundaryList<Scalar> nearWalls_;
   std::uint64_t searchesForWalls_ = 0;  // of neighbours_, when nearWalls_ were last asked for
   NarrowPhase<Scalar> narrow_;

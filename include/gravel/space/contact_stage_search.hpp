@@ -121,8 +121,25 @@ void ContactStage<Scalar, Layout>::search(const Bodies& bodies, const Config& co
                                           const Travel& travel, const Scalar& h, Profiler& profiler) {
   const Profiler::Scope scope(profiler, Phase::NeighbourSearch);
   neighbours_.setKind(config.broadPhase);
+  // Walls of fixed spheres that overlap have far more pairs than what falls on them has.
+  const auto isFixed = [&](std::uint32_t i) { return i < bodies.size() && bodies[i].isFixed(); };
+  if (!std::all_of(fixed_.begin(), fixed_.end(), isFixed)) {
+    neighbours_.clear();
+  }
   neighbours_.update(bodies.positions(), detail::RestingReaches<Bodies>{bodies}, bodies.ids(),
                      bodies.revision(), domain, time, Scalar(0), travel, h);
+  if (neighbours_.rebuilt()) {
+    fixed_.clear();
+    for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+      if (isFixed(i)) {
+        fixed_.push_back(i);
+      }
+    }
+    if (fixed_.size() > 1) {
+      neighbours_.leaveOut([&](const Pair& pair) { return isFixed(pair.first) && isFixed(pair.second); },
+                           bodies.ids());
+    }
+  }
 }
 
 template <Real Scalar, class Layout>

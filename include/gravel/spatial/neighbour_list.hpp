@@ -84,28 +84,30 @@ class NeighbourList {
     }
   }
 
+  /// Leaves out pairs of which `apart(pair)` until the next search: they cannot touch. Whoever lets them
+  /// touch again clears the list.
+  template <class Apart, class Ids>
+  void leaveOut(const Apart& apart, const Ids& ids) {
+    std::erase_if(pairs_, apart);
+    join(ids);
+  }
+
   /// A number that is another one, above 0, whenever pairs() may be others.
   std::uint64_t version() const { return version_; }
-
-  /// Whether some body was, or is on a way to be, further than half the skin from where the last search saw
-  /// it.
+  /// Whether some body was, or is on a way to be, half the skin from where the last search saw it.
   bool strays() const { return strays_ || !swift_.empty() || !common_.isNone(); }
-
   /// Whether the last update searched.
   bool rebuilt() const { return rebuilt_; }
   /// Searches made so far.
   std::uint64_t searches() const { return searches_; }
-
   /// Why the last update searched, or why it did not.
   const char* reason() const {
     return rebuilt_            ? reason_
            : !common_.isNone() ? "no body has left the others by half the skin since the last search"
                                : "no body has moved half the skin since the last search";
   }
-
   /// The skin [m] of the list in use.
   const S& skin() const { return skin_; }
-
   /// Fixes the skin [m] >= 0 from the next search on; without a value it is chosen again from the motion
   /// seen. Costs only: a thick skin means fewer searches and more candidates.
   void setSkin(std::optional<S> skin) {
@@ -116,8 +118,6 @@ class NeighbourList {
   }
 
   void setKind(BroadPhaseKind kind) { search_.setKind(kind); }
-  const BroadPhase<S>& search() const { return search_; }
-
   /// Forgets the list, so that the next update searches.
   void clear() { built_ = false; }
 
