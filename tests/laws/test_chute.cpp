@@ -110,7 +110,8 @@ ChuteFlow chute(double degrees, double atTop, double timeStep, double until, std
 // degrees, 0.01 less for two more; five seeds 0.565, sd 0.004. Spins are half of the shear; five seeds 0.476,
 // sd 0.019. Seen to fail: steps of 0.2 sqrt(d/g) (filling 0.606). Outside by measurement: no friction
 // (filling 0.591, no spin, I = 0.249); friction of 0.2, by which grains still creep at 18 degrees (0.036).
-// Deeper flows and steps: docs/theory-time-step.md.
+// At 18 degrees some slip once more before they stop (one of eight seeds at times 20 to 40); at times 45 to
+// 60 the means of twelve seeds are below 5e-5. Deeper flows and steps: docs/theory-time-step.md.
 TEST_CASE("Grains flow down a rough chute by mu(I) at 26 degrees, and stop at 18") {
   const ChuteFlow steep = chute(26.0, 3.0, 0.02, 30.0, 1);
   CAPTURE(steep.speed, steep.filling, steep.inertial, steep.spin, steep.moved);
@@ -119,8 +120,8 @@ TEST_CASE("Grains flow down a rough chute by mu(I) at 26 degrees, and stop at 18
   CHECK_THAT(steep.filling, WithinAbs(0.57, 0.02));
   CHECK_THAT(steep.spin, WithinAbs(0.5, 0.1));
   CHECK(std::abs(steep.moved) < 1e-11);
-  const ChuteFlow flat = chute(18.0, 0.5, 0.02, 40.0, 1);
+  const ChuteFlow flat = chute(18.0, 0.5, 0.02, 60.0, 1);
   CAPTURE(flat.speed, flat.last, flat.filling);
-  CHECK(flat.last < 0.01);
+  CHECK(flat.last < 1e-3);
   CHECK(std::abs(flat.moved) < 1e-11);
 }
