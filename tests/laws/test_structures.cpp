@@ -280,9 +280,7 @@ TEST_CASE("A small structure does the same, to the bit, whatever lies or moves b
         space.addBody(body);
       }
       addRows(space, after, {speed, 0, 0});
-      for (std::size_t step = 0; step < 250; ++step) {
-        space.computeDynamics(step);
-      }
+      advance(space, 250);
       ends.emplace_back();
       for (int i = 0; i <= ring.k; ++i) {
         ends.back().push_back(space.body(static_cast<std::size_t>(before + i)).load());
@@ -300,16 +298,29 @@ TEST_CASE("A small structure does the same, to the bit, whatever lies or moves b
   }
 }
 
-// What a solve leaves of a velocity is the tolerance times that which a step's fall gives: in a second less
-// than g dt t/1000. Seen to fail: as above (0.28 of the radius).
-TEST_CASE("A heavy ball stands on a light one beside many others") {
-  constexpr double dt = 2e-3;
-  Space<double> space = floorFor(dt, 1, 0.5, 0.5, false);
-  space.addBody(ball({0, 0, radius}, {0, 0, 0}, radius, 1.0));
-  space.addBody(ball({0, 0, 3 * radius}, {0, 0, 0}, radius, 1000.0));
-  addRows(space, 400, {0, 0, 0});
-  space.advanceTo(1.0);
-  CHECK(std::abs(space.body(1).position()[2] - 3 * radius) < 1e-3 * g * dt * 1.0);
+// Blows leave it sunk in by up to 0.07 of the small radius, and sweeps for overlaps that pass on as much as
+// they can take that away in 49 steps: bound at twice each. Seen to fail: as above (0.21; 404 of the 500
+// steps).
+TEST_CASE("A heavy ball that fell on a light one is borne by it, beside many others as alone") {
+  constexpr double r = 0.05;
+  Space<double> space = floorFor(1e-3, 1, 0.5, 0.5, false);
+  space.addBody(ball({0, 0, r}, {0, 0, 0}, r, 1.0));
+  space.addBody(ball({0, 0, 12 * r + 1e-3}, {0, 0, -4.43}, 10 * r, 1e4));
+  for (int i = 0; i < 400; ++i) {
+    space.addBody(ball({3 + 2 * r * (i % 20), 2 * r * (i / 20), r}, {0, 0, 0}, r, 1.0));
+  }
+  double deepest = 0;
+  int deep = 0;
+  for (std::size_t step = 0; step < 500; ++step) {
+    space.computeDynamics(step);
+    const Vec grain = space.body(0).position();
+    const Vec heavy = space.body(1).position();
+    const double overlap = std::max({r - grain[2], 11 * r - (heavy - grain).norm(), 10 * r - heavy[2]});
+    deepest = std::max(deepest, overlap);
+    deep += overlap > 0.01 * r ? 1 : 0;
+  }
+  CHECK(deepest < 0.14 * r);
+  CHECK(deep < 100);
 }
 
 }  // namespace test_structures

@@ -243,8 +243,6 @@ TEST_CASE("A blow between balls that spin is of second order in the step, for a 
   }
 }
 
-// The centre of mass of all bodies, each followed through its images, is on an epicycle of its own whatever
-// the collisions do: tested by the quantity that a body loses at an edge by a known amount.
 // Two balls that meet at u, side by side along y and z, and fly past each other about as fast as the disc's
 // pull to its middle would let them part: v_t^2/d = 1.28 - pull. Along their way both gain speed, by 0.96 in
 // a unit of time. Bounces are few: each leaves half the speed of the last one, and rests once all that are to
@@ -278,6 +276,8 @@ TEST_CASE("Two that graze each other in a patch are struck a few times, whatever
   }
 }
 
+// The centre of mass of all bodies, each followed through its images, is on an epicycle of its own whatever
+// the collisions do: tested by the quantity that a body loses at an edge by a known amount.
 TEST_CASE("Collisions keep the momentum of the patch; an edge takes Omega Lx/2 a unit of mass") {
   Space<double> space = patch(0.005, 0.3);
   fill(space, 80, 2.0);

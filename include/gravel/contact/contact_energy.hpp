@@ -207,8 +207,21 @@ class ContactEnergy {
     return any;
   }
 
-  /// Most rows that follow each other are of one island: each run of them is summed by itself.
+  /// Small islands each in the order of their rows, so that others have no say. Most other rows that follow
+  /// each other are of one island: each run of them is summed by itself.
   void findGains(const ContactColoring& colouring) {
+    gains_.assign(colouring.islands().size(), Gain{});
+    const auto take = [&](Gain& gain, std::size_t k) {
+      gain.sum += terms_[k];
+      gain.size += terms_[k] < S(0) ? S(-terms_[k]) : terms_[k];
+    };
+    parallelForTasks<Share::Alike>(colouring.bundles(), [&](std::size_t bundle) {
+      for (const ContactColoring::Part& rows : colouring.coloursOf(bundle)) {
+        for (std::size_t k = rows.begin; k < rows.end; ++k) {
+          take(gains_[islandOfRow_[k]], k);
+        }
+      }
+    });
     const std::size_t piece = std::max<std::size_t>(16, colouring.partsOfTask());
     const std::size_t pieces = (colouring.parts().size() + piece - 1) / piece;
     runs_.resize(std::max(runs_.size(), pieces));
@@ -216,17 +229,15 @@ class ContactEnergy {
       std::vector<Run>& runs = runs_[begin / piece];
       runs.clear();
       for (const ContactColoring::Part& part : colouring.parts().subspan(begin, end - begin)) {
-        for (std::size_t k = part.begin; k < part.end; ++k) {
+        const bool isTaken = part.begin >= colouring.loneCount() && !colouring.isOfLarge(part.begin);
+        for (std::size_t k = part.begin; k < part.end && !isTaken; ++k) {
           if (runs.empty() || runs.back().island != islandOfRow_[k]) {
             runs.push_back({islandOfRow_[k], {}});
           }
-          Gain& gain = runs.back().gain;
-          gain.sum += terms_[k];
-          gain.size += terms_[k] < S(0) ? S(-terms_[k]) : terms_[k];
+          take(runs.back().gain, k);
         }
       }
     });
-    gains_.assign(colouring.islands().size(), Gain{});
     for (std::size_t p = 0; p < pieces; ++p) {
       for (const Run& run : runs_[p]) {
         gains_[run.island].sum += run.gain.sum;

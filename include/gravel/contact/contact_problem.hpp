@@ -166,6 +166,8 @@ class ContactProblem : public detail::ProblemBodies<S> {
   /// The change of its normal velocity that row k asks for; of a small island, if `again`, wrongAt().
   const S& approachAt(std::size_t k) const { return approaches_[k]; }
   const S& wrongAt(std::size_t k) const { return wrongs_[k]; }
+  /// Whether it begins from an impulse of the last solve.
+  bool remembers(std::size_t k) const { return last_->normal(k) > S(0); }
   /// Whether what friction alone holds counts beside such a change, and for how much row k then does.
   bool mayHold(const S& approach) const;
   S heldAt(std::size_t k, const ContactColoring& colouring) const;

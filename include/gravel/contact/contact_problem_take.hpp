@@ -17,7 +17,7 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
                                const S& ratio, bool fresh, bool goesOn, const WayAhead<S>& way) {
   friction = kinds.rub || kinds.turn;
   grips = kinds.grip;
-  atOnce = settings.maxIterations < 2;
+  atOnce = settings.maxIterations < 2 && !(settings.islandTolerance > S(0));
   drifting = kinds.drift;
   again = goesOn;
   this->bend_ = way.bend;
@@ -38,7 +38,7 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   slipTargets.assign(slips ? rows.size() : 0, Vector3<S>::Zero());
   detail::resizeSparingly(rests_, contacts.size());
   detail::resizeSparingly(approaches_, contacts.size());
-  wrongs_.resize(colouring.islandsEnd());
+  detail::resizeSparingly(wrongs_, again ? colouring.islandsEnd() : 0);
   passes = again && watch.holds() && sameScales_ && ratio == S(1) && !kinds.spring && !drifting &&
            way.bend.empty() && !this->isScaled() && settings.restitutionThreshold == threshold_ &&
            (turning.empty() || last.turns());

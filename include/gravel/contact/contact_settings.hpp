@@ -20,21 +20,22 @@ struct ContactSettings {
   /// a step, 2 |a_rel.n| dt; a slower one stops. The same holds for tangential restitution.
   Scalar restitutionThreshold = Scalar(0);
   /// [1] > 0: sweeps end when the largest change of a velocity in a sweep is at most this times the largest
-  /// speed of approach among the contacts. The error of the impulses is this times the number of sweeps that
-  /// a disturbance takes through the pile.
+  /// speed of approach among the contacts of a small island, or of all large ones. The error of the impulses
+  /// is this times the number of sweeps that a disturbance takes through the pile.
   Scalar tolerance = Scalar(1e-6);
   /// [s] >= 0: if it is longer than the step, gaps that may rest are those of a step of this length. What a
   /// long step left would else be open in a short one, and lose its force.
   Scalar gapStep = Scalar(0);
   int maxIterations = 100;  ///< >= 1: sweeps at most
-  /// If > 0, small islands (SolverIslands) take sweepsOfLooks(contacts, islandLooks) of their own at most, in
-  /// place of maxIterations.
-  std::size_t islandLooks = 0;
+  /// [1] >= 0: if it is > 0, small islands (SolverIslands) take it in place of `tolerance`, and limitSweeps()
+  /// of their own, as what remembers no impulse if it does not or if nothing does.
+  Scalar islandTolerance = Scalar(0);
+  bool remembers = true;   ///< any contact does
   bool warmStart = true;   ///< begin from the impulses of the last step
   bool accelerate = true;  ///< momentum between sweeps; off: plain Gauss-Seidel
 };
 
-/// Looks at contacts that are cheap in any step.
+/// Looks at the contacts of an island, or of all large ones, that are cheap in any step.
 inline constexpr std::size_t usualLooks = 4000;
 
 /// As many sweeps over these contacts as make so many looks, from 20 to 1000: where contacts are few (below
@@ -47,14 +48,16 @@ inline int sweepsOfLooks(std::size_t contacts, std::size_t looks = usualLooks) {
 /// no impulse is remembered, as in a structure that was just put up, by a million looks, and to a hundredth
 /// of the tolerance: what slips while forces are being found may never come to rest again. What it costs
 /// stands in docs/theory-contact.md.
+/// \param remembers  any of these contacts
 template <Real S>
 void limitSweeps(ContactSettings<S>& settings, std::size_t most, std::size_t contacts, bool remembers) {
+  settings.islandTolerance = most == 0 ? settings.tolerance : S(0);
+  settings.remembers = remembers;
   if (most == 0 && !remembers) {
     const S least = std::min<S>(settings.tolerance, Eigen::NumTraits<S>::epsilon());
     settings.tolerance = std::max<S>(S(0.01) * settings.tolerance, least);
   }
   const std::size_t looks = remembers ? usualLooks : 1'000'000;
-  settings.islandLooks = most > 0 ? 0 : looks;
   settings.maxIterations =
       most > 0 ? static_cast<int>(std::min<std::size_t>(most, std::numeric_limits<int>::max()))
                : sweepsOfLooks(contacts, looks);
@@ -116,6 +119,7 @@ template <Real S>
 void validate(const ContactSettings<S>& settings) {
   detail::require("restitutionThreshold", settings.restitutionThreshold, detail::nonNegative<S>());
   detail::require("gapStep", settings.gapStep, detail::nonNegative<S>());
+  detail::require("contact islandTolerance", settings.islandTolerance, detail::nonNegative<S>());
   auto tolerance = detail::positive<S>();
   tolerance.high = S(1);
   tolerance.text = "> 0, <= 1";

@@ -11,7 +11,8 @@
 
 namespace gravel {
 
-/// How overlap is removed. A `Space` takes a factor of its own, 0.4 by default, and sweepsOfLooks().
+/// How overlap is removed. What is said of all contacts is said of those of an island, if that is small. A
+/// `Space` takes a factor of its own, 0.4 by default, and sweepsOfLooks().
 template <Real Scalar>
 struct CorrectionSettings {
   Scalar factor = Scalar(0.8);  ///< [1], 0 … 1: part of each overlap to remove

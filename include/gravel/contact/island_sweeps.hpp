@@ -53,7 +53,7 @@ class IslandSweeps : private RowImpulses<S> {
 
   IslandReport<S> solve() {
     const bool accelerate =
-        settings_.accelerate && (settings_.islandLooks > 0 || settings_.maxIterations > 2);
+        settings_.accelerate && (settings_.islandTolerance > S(0) || settings_.maxIterations > 2);
     for (bool first = true; left_ > 0; first = false) {
       if (first || !accelerate) {
         sweep<Way::Bare>();
@@ -85,6 +85,8 @@ class IslandSweeps : private RowImpulses<S> {
     S approach = S(0);  ///< the largest change of a velocity that is asked for
     S held = S(0);      ///< what friction alone holds counts for that
     S speed = S(0);     ///< the largest
+    bool remembers = false;
+    S enough = S(0);  ///< a change that is right
     SweepCourse<S> course{S(0), 1};
     Progress now;
     bool ended = false;
@@ -107,6 +109,7 @@ class IslandSweeps : private RowImpulses<S> {
       Island& island = islandOf(k);
       ++island.rows;
       island.approach = std::max<S>(island.approach, problem_.approachAt(k));
+      island.remembers = island.remembers || problem_.remembers(k);
     }
     for (std::size_t k = begin_; k < end_; ++k) {
       Island& island = islandOf(k);
@@ -117,6 +120,7 @@ class IslandSweeps : private RowImpulses<S> {
     for (Island& island : islands_) {
       island.approach = std::max<S>(island.approach, island.held);
       island.ended = !(island.approach > S(0));
+      setLimits(island);
       left_ += island.ended ? 0U : 1U;
     }
     for (std::size_t k = begin_; k < end_ && left_ < islands_.size(); ++k) {
@@ -126,8 +130,14 @@ class IslandSweeps : private RowImpulses<S> {
     }
   }
 
-  S enough(const Island& island) const {
-    return std::max<S>(settings_.tolerance, S(8) * Eigen::NumTraits<S>::epsilon()) * island.approach;
+  void setLimits(Island& island) const {
+    ContactSettings<S> own = settings_;
+    if (own.islandTolerance > S(0)) {
+      own.tolerance = own.islandTolerance;
+      limitSweeps(own, 0, island.rows, own.remembers && island.remembers);
+    }
+    island.enough = std::max<S>(own.tolerance, S(8) * Eigen::NumTraits<S>::epsilon()) * island.approach;
+    island.course = SweepCourse<S>(island.enough, own.maxIterations);
   }
 
   /// What was solved before may be right as it is. What is only just so would never become better.
@@ -137,16 +147,20 @@ class IslandSweeps : private RowImpulses<S> {
       wrong_sq = std::max<S>(wrong_sq, problem_.wrongAt(k));
     }
     for (Island& island : islands_) {
-      using std::sqrt;
-      const S right = enough(island) / S(16);
+      const S right = island.enough / S(16);
       if (!island.ended && !(island.now.change_sq > right * right)) {
-        report_ += {1, island.rows, S(sqrt(island.now.change_sq) / island.approach)};
-        end(island);
+        keep(island);
       }
     }
   }
 
-  /// The course of those that are left. Changes below the rounding of velocities are none.
+  void keep(Island& island) {
+    using std::sqrt;
+    report_ += {1, island.rows, S(sqrt(island.now.change_sq) / island.approach)};
+    end(island);
+  }
+
+  /// Changes below the rounding of velocities are none.
   void begin() {
     for (std::size_t k = begin_; k < end_ && left_ > 0; ++k) {
       const ContactColoring::Row& ends = colouring_.rows()[k];
@@ -156,10 +170,10 @@ class IslandSweeps : private RowImpulses<S> {
     }
     for (Island& island : islands_) {
       const S rounding = Eigen::NumTraits<S>::epsilon() * island.speed;
-      island.course =
-          SweepCourse<S>(std::max<S>(enough(island), rounding),
-                         settings_.islandLooks > 0 ? sweepsOfLooks(island.rows, settings_.islandLooks)
-                                                   : settings_.maxIterations);
+      island.course.allow(rounding);
+      if (problem_.again && !island.ended && !(island.now.change_sq > rounding * rounding)) {
+        keep(island);
+      }
     }
   }
 

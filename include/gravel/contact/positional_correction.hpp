@@ -58,8 +58,8 @@ class PositionalCorrection {
         watch_.enterFirst(k, deep_[colouring.rows()[k].contact] == 0);
       }
     });
-    const Opened ofIslands =
-        orderedSum(colouring.bundles(), 1, Opened{}, [&](std::size_t bundle, std::size_t /*next*/) {
+    const Opened ofIslands = orderedSum<Share::AsFree>(
+        colouring.bundles(), 1, Opened{}, [&](std::size_t bundle, std::size_t /*next*/) {
           return openBundle(contacts, colouring, bundle, settings);
         });
     Course course{enough, settings.maxIterations};

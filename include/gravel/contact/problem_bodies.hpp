@@ -49,6 +49,8 @@ class ProblemBodies {
   Vector3<S> impulseOut(const Vector3<S>& j) const { return scaled<S>(j, -speedExponent_ - massExponent_); }
   bool isScaled() const { return speedExponent_ != 0 || massExponent_ != 0; }
   S energyOut(const S& e) const { return scaled<S>(e, -2 * speedExponent_ - massExponent_); }
+  /// Changes of velocities below that are none.
+  S roundingOfSpeeds() const { return Eigen::NumTraits<S>::epsilon() * fastest_; }
   S speedIn(const S& v) const { return scaled<S>(v, speedExponent_); }
   Vector3<S> speedIn(const Vector3<S>& v) const { return scaled<S>(v, speedExponent_); }
   Packed<S> speedIn(const Packed<S>& v) const { return scaledLanes(v, speedExponent_); }
@@ -84,8 +86,9 @@ class ProblemBodies {
     sameScales_ = speedExponent == speedExponent_ && massExponent == massExponent_;
     again = again && (sameScales_ || !plain);
     heaviest_ = scaled<S>(scales.heaviest, massExponent_);
+    fastest_ = scaled<S>(scales.fastest, speedExponent_);
     mostFall_ = scales.mostFall;
-    mostGuess_ = tooMuch * scaled<S>(scales.fastest, speedExponent_) * heaviest_;
+    mostGuess_ = tooMuch * fastest_ * heaviest_;
     initial[n].v = initial[n].s = Vector3<S>::Zero();
     initial[n].fall = initial[n].radius = S(0);
     bodies[n] = Body{Vector3<S>::Zero(), S(0), Vector3<S>::Zero(), S(0)};
@@ -270,6 +273,7 @@ class ProblemBodies {
   /// Above that an impulse of the last problem would leave nothing but its rounding: speeds have fallen.
   S mostGuess_ = S(0);
   S heaviest_ = S(0);  ///< mass, scaled
+  S fastest_ = S(0);   ///< speed, scaled
   S mostFall_ = S(0);  ///< [m s^-2]
   /// Normal impulse that friction counts at most: 100 times what stops all at the largest approach and a
   /// fall.

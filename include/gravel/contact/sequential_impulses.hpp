@@ -57,10 +57,10 @@ class SequentialImpulses : private detail::RowImpulses<S> {
                          });
     detail::resizeSparingly(places_, colouring.bundles() > 0 ? problem.bodies.size() : 0);
     detail::IslandReport<S> sum{1, colouring.loneCount()};
-    sum += orderedSum(colouring.bundles(), 1, detail::IslandReport<S>{},
-                      [&](std::size_t bundle, std::size_t /*next*/) {
-                        return detail::IslandSweeps<S>(problem, colouring, bundle, settings, places_).solve();
-                      });
+    sum += orderedSum<Share::AsFree>(
+        colouring.bundles(), 1, detail::IslandReport<S>{}, [&](std::size_t bundle, std::size_t /*next*/) {
+          return detail::IslandSweeps<S>(problem, colouring, bundle, settings, places_).solve();
+        });
     if (colouring.islandsEnd() < problem.rows.size()) {
       sum += solveLarge(problem, colouring, settings);
     }
@@ -84,7 +84,8 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       return {};
     }
     const S rounding = S(8) * Eigen::NumTraits<S>::epsilon();
-    const S enough = std::max<S>(settings.tolerance, rounding) * problem.largestApproach;
+    const S enough = std::max<S>(std::max<S>(settings.tolerance, rounding) * problem.largestApproach,
+                                 problem.roundingOfSpeeds());
     // What is only just content would never become better, and a heap at rest creep by it.
     const S right = enough / S(16);
     if (problem.again && !(problem.wrong_sq > right * right)) {

@@ -49,7 +49,8 @@ class SolverIslands {
     for (const Row& row : rows) {
       std::uint32_t& count = numbers_[rootOf(row)];
       const std::uint32_t both = degree[row.slot1] + degree[row.slot2];
-      count = both == 0 || both > colours + 1 || count > fewRows ? none : count + 1;
+      // Of a body that no other moves with, all but this one row may have taken colours: both - 1.
+      count = both == 0 || both > colours || count > fewRows ? none : count + 1;
     }
     std::uint32_t rowsOfLast = fewRows;
     constexpr std::uint32_t numbered = none / 2;  // and above: no count, but a number

@@ -35,6 +35,8 @@ class SweepCourse {
   /// \param enough  a change that ends them \param most  sweeps, >= 1
   SweepCourse(const S& enough, int most) : enough_(enough), most_(most) {}
 
+  /// Changes up to that are right, too.
+  void allow(const S& change) { enough_ = std::max<S>(enough_, change); }
   int sweeps() const { return sweeps_; }
   /// Of the last sweep.
   const S& change() const { return change_; }

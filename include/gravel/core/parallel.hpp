@@ -208,7 +208,7 @@ void parallelFor(std::size_t n, std::size_t grain, F&& f) {
 
 /// Sum over chunks of f(begin, end), added pairwise in the order of chunks: the same bits for any number
 /// of threads, and a rounding error that grows with the logarithm of the number of chunks (Higham 1993).
-template <class T, class F>
+template <Share share = Share::Alike, class T, class F>
 T orderedSum(std::size_t n, std::size_t chunk, const T& zero, F&& f) {
   static_assert(!std::is_same_v<T, bool>,
                 "gravel: orderedSum of bool: sum a number");  // vector<bool> would race
@@ -221,7 +221,7 @@ T orderedSum(std::size_t n, std::size_t chunk, const T& zero, F&& f) {
     return f(0, n);
   }
   std::vector<T> parts(count, zero);
-  parallelForTasks<Share::Alike>(count, [&](std::size_t c) { parts[c] = f(chunks.begin(c), chunks.end(c)); });
+  parallelForTasks<share>(count, [&](std::size_t c) { parts[c] = f(chunks.begin(c), chunks.end(c)); });
   for (std::size_t width = 1; width < count; width *= 2) {
     for (std::size_t c = 0; c + width < count; c += 2 * width) {
       parts[c] += parts[c + width];

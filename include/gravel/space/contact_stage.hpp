@@ -106,7 +106,8 @@ class ContactStage {
         .islandLooks = usualLooks,
         .keepAngularMomentum = domain.isOpen()};  // images have none to keep
     separationLoss_ = solver_.correctPositions(bodies, settings).loss;
-    if (moved_ = !solver_.displacements().empty(); moved_) {
+    moved_ = !solver_.displacements().empty();
+    if (moved_) {
       renewGeometry(bodies, config, time);
     }
   }
@@ -258,7 +259,6 @@ class ContactStage {
   const Present& present(const Bodies& bodies) const;
 
   void setDrift(std::size_t plane, const Vector3<Scalar>& drift, const Scalar& change);
-
   void renewGeometry(const Bodies& bodies, const Config& config, const Scalar& time);
 
   template <class Course>

@@ -8,8 +8,8 @@
 namespace gravel {
 
 /// What changes velocities between drift and kick changes the kick's work by F.dv kick, for which no drift
-/// takes anything out of the potential. Of two movable spheres these cancel in a uniform field; a fixed one
-/// takes its part away.
+/// takes anything out of the potential (what a hook does is booked from the velocities as they are). Of two
+/// movable spheres these cancel in a uniform field; a fixed one takes its part away.
 template <Real Scalar, class Layout>
 Scalar ContactStage<Scalar, Layout>::separationWork(const ForceStage<Scalar, Layout>& force,
                                                     const Bodies& bodies, Scalar kick) const {
@@ -21,8 +21,8 @@ Scalar ContactStage<Scalar, Layout>::separationWork(const ForceStage<Scalar, Lay
       Scalar sum(0);
       for (std::size_t k = begin; k < end; ++k) {
         const Displacement<Scalar>& d = all[k];
-        sum += force.conservativeForce(bodies, d.body).dot(d.shift);
-        sum -= kick * Vector3<Scalar>(bodies.forces()[d.body]).dot(d.change);
+        const Vector3<Scalar> F = force.conservativeForce(bodies, d.body);
+        sum += F.dot(d.shift) - kick * F.dot(d.change);
         if (frame.turns()) {
           const Vector3<Scalar> x = bodies[d.body].position();
           sum += Scalar(bodies[d.body].mass()) * (frame.potential(x - d.shift) - frame.potential(x));
