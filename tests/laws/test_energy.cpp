@@ -196,8 +196,8 @@ TEST_CASE(
 // what it takes from the work of the kick that follows was not booked.
 TEST_CASE(
     "What takes overlap with fixed balls away leaves the ledger of a field closed, in parts of a step too") {
-  for (const int parts : {1, 3}) {
-    SimulationConfig<double> config = plain(0.01 * parts);
+  for (const std::size_t parts : {std::size_t{1}, std::size_t{3}}) {
+    SimulationConfig<double> config = plain(0.01 * static_cast<double>(parts));
     config.coeffRestitution = 0;
     config.coeffFriction = config.coeffStaticFriction = 1;
     config.contactSubsteps = parts;
