@@ -232,15 +232,23 @@ TEST_CASE("contacts of one colour share no movable body; lone ones share none wi
       CHECK((c.second == staticPartner || bodies[c.second].isFixed() || uses[c.second] == 1));
     }
     CHECK(coloring.blocks() == coloring.bundles());
+    std::size_t colours = 0;  // a contact has a neighbour of each colour before its own: none is left out
     for (std::size_t bundle = 0; bundle < coloring.bundles(); ++bundle) {
+      colours = std::max(colours, coloring.coloursOf(bundle).size());
       for (const ContactColoring::Part& rows : coloring.coloursOf(bundle)) {
         CHECK(rows.begin < rows.end);
         check(rows.begin, rows.end);
       }
     }
+    bool ends = false;
     for (std::size_t colour = 0; colour < coloring.colours(); ++colour) {
       check(coloring.begin(colour), coloring.end(colour));
+      const bool any = coloring.begin(colour) < coloring.end(colour);
+      CHECK_FALSE((ends && any));
+      ends = ends || !any;
+      colours = std::max(colours, any ? colour + 1 : 0);
     }
+    CHECK(colours == coloring.colours());
     CHECK(coloring.begin(coloring.colours()) == contacts.size());  // no overflow here
     CHECK(std::count(seen.begin(), seen.end(), true) == static_cast<std::ptrdiff_t>(contacts.size()));
   }

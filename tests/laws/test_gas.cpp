@@ -135,7 +135,7 @@ TEST_CASE(
     double T = 1;
     double W = 0;
     const auto rates = [&](double flight, double spin) {
-      const double k = 4.0 / 3 * 0.77468 * std::sqrt(flight);
+      const double k = 4.0 / 3 * scenes::gasCollisionRate(options.fraction) * std::sqrt(flight);
       return std::pair{-k * ((1 - e * e) / 4 + y * (1 - y)) * flight + k * y * y / 0.4 * spin,
                        k * y * y / 0.4 * flight - k * y / 0.4 * (1 - y / 0.4) * spin};
     };

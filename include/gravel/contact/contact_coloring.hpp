@@ -66,6 +66,8 @@ class ContactColoring {
   std::span<const Row> rows() const { return rows_; }
   std::size_t loneCount() const { return loneCount_; }
   const detail::SolverIslands& islands() const { return islands_; }
+  /// The slot of the two by which islands() knows a row.
+  std::uint32_t ofIsland(const Row& row) const { return movable_[row.slot1] != 0 ? row.slot1 : row.slot2; }
   std::size_t islandsEnd() const { return islandsEnd_; }  ///< where rows of small islands end
   bool isOfLarge(std::size_t k) const { return k >= islandsEnd_; }
   /// The number of that of row k, if loneCount() <= k < islandsEnd().
@@ -194,7 +196,7 @@ class ContactColoring {
           colours_ = std::max<std::size_t>(colours_, colour + 1U);
           used_[slot1] |= std::uint64_t{movable_[slot1]} << colour;
           used_[slot2] |= std::uint64_t{movable_[slot2]} << colour;
-          const std::uint32_t island = islands_.numberOf(movable_[slot1] != 0 ? slot1 : slot2);
+          const std::uint32_t island = islands_.numberOf(ofIsland(byContact_[k]));
           if (island != detail::SolverIslands::none) {
             group_[k] = static_cast<std::uint8_t>(inBundle + colour);
             ++bundled_[islands_.bundleOf(island)][colour];
@@ -260,7 +262,7 @@ class ContactColoring {
     for (std::size_t k = 0; k < byContact_.size() && !islandOfRow_.empty(); ++k) {
       if (group_[k] >= inBundle) {
         const Row& row = byContact_[k];
-        const std::uint32_t island = islands_.numberOf(movable_[row.slot1] != 0 ? row.slot1 : row.slot2);
+        const std::uint32_t island = islands_.numberOf(ofIsland(row));
         const std::size_t to = bundled_[islands_.bundleOf(island)][group_[k] - inBundle]++;
         rows_[to] = row;
         islandOfRow_[to - loneCount_] = island;

@@ -250,8 +250,7 @@ class ContactEnergy {
     detail::resizeAnew(islandOfRow_, colouring.rows().size());
     detail::forAllParts(colouring, [&](std::size_t begin, std::size_t end) {
       for (std::size_t k = begin; k < end; ++k) {
-        const ContactColoring::Row& row = colouring.rows()[k];
-        islandOfRow_[k] = colouring.islands().of(colouring.movable(row.slot1) ? row.slot1 : row.slot2);
+        islandOfRow_[k] = colouring.islands().of(colouring.ofIsland(colouring.rows()[k]));
       }
     });
   }

@@ -60,11 +60,11 @@ class IslandSweeps : private RowImpulses<S> {
       } else {
         sweep<Way::Coasting>();
       }
-      const bool slides = letSlide();
+      letSlide();
       for (Island& island : islands_) {
         if (!island.ended) {
           report_.looks += island.rows;
-          goOn(island, first || !accelerate, slides && island.more);
+          goOn(island, first || !accelerate);
         }
       }
       if (accelerate && left_ > 0) {
@@ -226,29 +226,27 @@ class IslandSweeps : private RowImpulses<S> {
     }
   }
 
-  /// Once for all islands. \return whether any row of theirs begins to slide
-  bool letSlide() {
-    bool any = false;
+  /// Once for all islands.
+  void letSlide() {
     if (problem_.grips && !problem_.atOnce &&
         std::any_of(islands_.begin(), islands_.end(), [](const Island& island) { return island.asks; })) {
       for (std::size_t k = begin_; k < end_; ++k) {
         Island& island = islandOf(k);
         if (island.asks && problem_.letSlide(k, colouring_, island.course.slides())) {
-          island.more = any = true;
+          island.more = true;
         }
       }
     }
-    return any;
   }
 
-  void goOn(Island& island, bool first, bool more) {
-    if (!island.course.goesOn(more)) {
+  void goOn(Island& island, bool first) {
+    if (!island.course.goesOn(island.more)) {
       report_ += {island.course.sweeps(), 0, S(island.course.change() / island.approach)};
       end(island);
     } else if (first) {
-      island.course.begin(island.now, more);
+      island.course.begin(island.now, island.more);
     } else {
-      island.course.goOn(island.now, more);
+      island.course.goOn(island.now, island.more);
     }
   }
 
