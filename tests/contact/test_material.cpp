@@ -34,7 +34,7 @@ TEST_CASE("a frictionless partner makes a frictionless pair") {
 
 namespace {
 
-/// Bridges, Hatzes & Lin 1984: frosty ice spheres at 200 K, e = (v / 0.0077 cm/s)^-0.234, at most 1.
+/// Bridges, Hatzes & Lin 1984: frosty ice spheres at some 200 K, e = (v / 0.0077 cm/s)^-0.234, at most 1.
 template <class S>
 Material<S> ice() {
   Material<S> material;

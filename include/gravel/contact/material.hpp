@@ -108,8 +108,8 @@ Scalar fractionalPower(const Scalar& x, const Scalar& y) {
 
 /// Restitution at a speed of approach v [m s^-1]: the one place where a law of impact speed enters.
 ///   e(v) = restitution min(1, (v / restitutionSpeed)^-restitutionExponent)
-/// Frosty ice at 200 K is {restitution 1, restitutionExponent 0.234, restitutionSpeed 7.7e-5 m/s} (Bridges,
-/// Hatzes & Lin 1984, Nature 309, 333). A power where the exponent is not 0.
+/// Frosty ice at some 200 K is {restitution 1, restitutionExponent 0.234, restitutionSpeed 7.7e-5 m/s}
+/// (Bridges, Hatzes & Lin 1984, Nature 309, 333). A power where the exponent is not 0.
 template <Real Scalar>
 Scalar restitutionAt(const Material<Scalar>& material, const Scalar& approachSpeed) {
   if (material.restitutionExponent == Scalar(0) || !(approachSpeed > material.restitutionSpeed)) {
