@@ -160,7 +160,8 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       rub(problem, colouring, k);
     }
     if (!problem.turning.empty()) {
-      // Friction and resistance act on one spin: in turns, each taking 2/7 or more off what is left.
+      // Friction and resistance act on one spin: in turns, each taking k/(1 + k) off what is left, 2/7 of a
+      // homogeneous sphere. For k <= 0.1 they end too early, and something creeps (docs/theory-contact.md).
       const S speed =
           detail::maxAbs(b1.s) + detail::maxAbs(b2.s) + detail::maxAbs(b1.v) + detail::maxAbs(b2.v);
       const S enough = Eigen::NumTraits<S>::epsilon() * speed;
