@@ -1,5 +1,9 @@
 #include "laws/laws.hpp"
 #include "support/catch.hpp"
+#include <gravel/core/random.hpp>
+
+#include <array>
+#include <cmath>
 
 // Resistance to rolling and spinning: closed forms of a sphere on a plane.
 
@@ -13,7 +17,7 @@ namespace {
 constexpr double g = 9.81;
 
 Space<double> onPlane(double slope, double mu, double rolling, double spinning, double dt, const Vec& v,
-                      const Vec& w) {
+                      const Vec& w, double inertiaFactor = 0.4) {
   SimulationConfig<double> config = plain(dt);
   config.coeffRestitution = 0;
   config.coeffFriction = config.coeffStaticFriction = mu;
@@ -22,7 +26,9 @@ Space<double> onPlane(double slope, double mu, double rolling, double spinning, 
   Space<double> space(config);
   space.setUniformField({g * std::sin(slope), 0, -g * std::cos(slope)});
   space.addPlane({0, 0, 1}, 0);
-  space.addBody(ball({0, 0, 0.5}, v, 0.5, 2.0, w));
+  Body<double> body = ball({0, 0, 0.5}, v, 0.5, 2.0, w);
+  body.inertia = inertiaFactor * 2.0 * 0.25;
+  space.addBody(body);
   return space;
 }
 
@@ -57,6 +63,93 @@ TEST_CASE("On an incline a sphere stays while the tangent is below the rolling c
       CHECK_THAT(v, WithinRel(5.0 / 7 * g * (std::sin(slope) - mu_r * std::cos(slope)), 1e-6));
     }
     CHECK_THAT(space.energyLedger().total(), WithinAbs(0.0, 1e-9 + 2.0 * g * std::cos(slope) * 0.5 * 1.01));
+  }
+}
+
+// Friction and resistance act on one spin. Taken in turns, each leaves 1/(1 + k) of the rest.
+TEST_CASE("On an incline a ball of any moment of inertia stays, or rolls as fast as it must") {
+  for (const double k : {1e-4, 0.01, 0.1, 0.4, 2.0 / 3}) {
+    for (const double part : {0.5, 0.99, 1.01, 1.5}) {
+      const double mu_r = 0.3;
+      const double slope = std::atan(part * mu_r);
+      Space<double> space = onPlane(slope, 0.6, mu_r, 0, 0.01, {0, 0, 0}, {0, 0, 0}, k);
+      advance(space, 200);
+      const double v = space.body(0).velocity()[0];
+      CAPTURE(k, part, v);
+      if (part < 1) {
+        CHECK(std::abs(v) < 1e-14);
+      } else {
+        CHECK_THAT(v, WithinRel(2 * g * (std::sin(slope) - mu_r * std::cos(slope)) / (1 + k), 1e-9));
+      }
+    }
+  }
+}
+
+// Friction and resistance in one blow: at most one of them at its limit leaves nothing else.
+TEST_CASE("A blow that both friction and resistance could stop leaves neither slip nor turn") {
+  for (const double k : {1e-4, 0.1, 0.4, 2.0 / 3}) {
+    for (const bool onBall : {false, true}) {
+      SimulationConfig<double> config = plain(0.01);
+      config.coeffRestitution = 0.5;
+      config.coeffFriction = config.coeffStaticFriction = 5;
+      config.rollingFriction = 50;
+      Space<double> space(config);
+      Body<double> body = ball({0, 0, 0.505}, {1, 0, -1}, 0.5, 2.0);
+      body.inertia = k * 2.0 * 0.25;
+      space.addBody(body);
+      if (onBall) {
+        Body<double> fixed = ball({0, 0, -1.0}, {0, 0, 0}, 1.0);
+        fixed.fixed = true;
+        space.addBody(fixed);
+        space.body(0).position()[0] = -0.005;  // above the other when they meet
+      } else {
+        space.addPlane({0, 0, 1}, 0);
+      }
+      space.computeDynamics(0);
+      REQUIRE(space.impacts().size() == 1);
+      const Vec v = space.body(0).velocity();
+      CAPTURE(k, onBall, v[0], space.body(0).angularVelocity()[1]);
+      CHECK(std::abs(v[0]) < 1e-14);
+      CHECK(Vec(space.body(0).angularVelocity()).norm() < 1e-15 / k);
+      CHECK_THAT(v[2], WithinRel(0.5, 1e-14));
+    }
+  }
+}
+
+// All that a blow may do: both stop, one of them is at its limit, or both; with and without a slip that is
+// flung back.
+TEST_CASE("Blows with friction and resistance keep momentum and never add energy") {
+  const CounterRandom random(11);
+  std::uint64_t counter = 0;
+  const auto any = [&] { return random.uniform(counter++, -1, 1); };
+  const auto strength = [&] { return std::pow(10.0, 2 * any()); };
+  for (std::size_t blow = 0; blow < 300; ++blow) {
+    SimulationConfig<double> config = plain(0.01);
+    config.coeffRestitution = 0.5;
+    config.coeffFriction = config.coeffStaticFriction = strength();
+    config.rollingFriction = strength();
+    config.spinningFriction = strength();
+    config.tangentialRestitution = std::array{0.0, 0.5, 1.0}[blow % 3];
+    Space<double> space(config);
+    const double r = strength() / 100;
+    Body<double> one = ball({0, 0, -0.5}, {any(), any(), 1}, 0.5, 1, {any(), any(), any()});
+    Body<double> two = ball({0, 0, r + 0.001}, {any(), any(), -1}, r, strength(), {any(), any(), any()});
+    one.inertia = 0.4 * 0.25 * std::pow(10.0, any() - 1);
+    two.inertia = 0.4 * two.mass * r * r * std::pow(10.0, any() - 1);
+    space.addBody(one);
+    space.addBody(two);
+    const auto mechanical = [&] { return space.energyLedger().mechanical(); };
+    const auto before = space.conserved();
+    const double energy = mechanical();
+    space.computeDynamics(0);
+    REQUIRE(space.impacts().size() == 1);
+    const auto after = space.conserved();
+    const double size = 1 + two.mass;
+    CHECK((Vec(after.momentum) - Vec(before.momentum)).norm() < 1e-14 * size);
+    CHECK((Vec(after.angularMomentum) - Vec(before.angularMomentum)).norm() < 1e-14 * size);
+    CHECK(mechanical() < energy);
+    CHECK(space.energyLedger().friction > 0);
+    CHECK_THAT(space.energyLedger().total(), WithinRel(energy, 1e-13));
   }
 }
 

@@ -135,18 +135,15 @@ class ContactProblem : public detail::ProblemBodies<S> {
   /// are found from the same velocities.
   [[gnu::always_inline]] inline detail::RowChanges<S> change(const Group& group, Lanes& row,
                                                              const detail::BodyLanes<S>& b1,
-                                                             const detail::BodyLanes<S>& b2) const {
-    detail::RowChanges<S> changes;
-    const detail::PackedVector<S> v_rel = b2.v - b1.v;
-    const Pack v_n = row.n.dot(v_rel);
-    pushRight(row, b1, b2, v_n, changes);
-    if (friction) {
-      rubRight(row, b1, b2, slipOf(group, slipVelocity(row, v_rel, v_n, b1, b2)), slidesOf(group), changes);
-    } else {
-      changes.rubs = changes.slides = Pack::zero() > Pack::zero();
-    }
-    return changes;
-  }
+                                                             const detail::BodyLanes<S>& b2) const;
+
+  /// The same of what resists turning, and of friction beside it. \param changes  of change(), which bodies
+  /// get
+  [[gnu::always_inline]] inline detail::TurningChanges<S> changeTurn(const Group& group, Lanes& row,
+                                                                     detail::BodyLanes<S>& b1,
+                                                                     detail::BodyLanes<S>& b2,
+                                                                     const detail::RowSlides<S>& sliding,
+                                                                     detail::RowChanges<S>& changes) const;
 
   /// The part of this slip that is to vanish.
   [[gnu::always_inline]] inline detail::PackedVector<S> slipOf(const Group& group,

@@ -32,19 +32,52 @@ inline detail::RowSlides<S> ContactProblem<S>::slidesOf(const Group& group) cons
 template <Real S>
 inline auto ContactProblem<S>::wrongAt(const Group& group, const Lanes& present) const -> Pack {
   Lanes row = present;
-  const auto b1 = detail::BodyLanes<S>::load(bodies, group.slot1);
-  const auto b2 = detail::BodyLanes<S>::load(bodies, group.slot2);
-  const auto changes = change(group, row, b1, b2);
+  auto b1 = detail::BodyLanes<S>::load(bodies, group.slot1);
+  auto b2 = detail::BodyLanes<S>::load(bodies, group.slot2);
+  auto changes = change(group, row, b1, b2);
   Pack wrong = changes.change_sq();
   if (!turning.empty()) {
-    const auto turned = detail::TurningLanes<S>::load(turning, group).resist(row, b1, b2);
-    wrong = largerOf(wrong, turned.d_rho.squaredNorm());
+    const auto turned = changeTurn(group, row, b1, b2, slidesOf(group), changes);
+    wrong = largerOf(changes.change_sq(), turned.d_rho.squaredNorm());
   }
   if (!grips) {
     return wrong;
   }
   const auto open = changes.slides & !slidesOf(group).kinetic & (row.stick > row.slide);
   return choose(open, Pack::all(Eigen::NumTraits<S>::highest()), wrong);
+}
+
+template <Real S>
+inline detail::RowChanges<S> ContactProblem<S>::change(const Group& group, Lanes& row,
+                                                       const detail::BodyLanes<S>& b1,
+                                                       const detail::BodyLanes<S>& b2) const {
+  detail::RowChanges<S> changes;
+  const detail::PackedVector<S> v_rel = b2.v - b1.v;
+  const Pack v_n = row.n.dot(v_rel);
+  pushRight(row, b1, b2, v_n, changes);
+  if (friction) {
+    rubRight(row, b1, b2, slipOf(group, slipVelocity(row, v_rel, v_n, b1, b2)), slidesOf(group), changes);
+  } else {
+    changes.rubs = changes.slides = Pack::zero() > Pack::zero();
+  }
+  return changes;
+}
+
+template <Real S>
+inline auto ContactProblem<S>::changeTurn(const Group& group, Lanes& row, detail::BodyLanes<S>& b1,
+                                          detail::BodyLanes<S>& b2, const detail::RowSlides<S>& sliding,
+                                          detail::RowChanges<S>& changes) const -> detail::TurningChanges<S> {
+  const auto lanes = detail::TurningLanes<S>::load(turning, group);
+  push(b1, b2, changes.dj * row.n + changes.dt);
+  twist(row, b1, b2, changes.dt);
+  auto turned = lanes.resist(row, b1, b2);
+  turn(b1, b2, turned);
+  if (friction) {
+    const detail::PackedVector<S> v_rel = b2.v - b1.v;
+    const auto slip = slipOf(group, slipVelocity(row, v_rel, row.n.dot(v_rel), b1, b2));
+    lanes.stopTogether(row, b1, b2, slip, sliding, changes, turned);
+  }
+  return turned;
 }
 
 template <Real S>

@@ -4,6 +4,7 @@
 /// What the blows of a step do to the courses of bodies.
 
 #include <gravel/contact/impact_forecast.hpp>
+#include <gravel/contact/slip_and_turn.hpp>
 
 namespace gravel::detail {
 
@@ -76,37 +77,56 @@ class ImpactCourses : protected ImpactForecast<S> {
     }
   }
 
-  /// Resistance to rolling and spinning, for what a blow of dv_n [m s^-1] along the normal left of the turn.
-  /// \return its angular impulse, over the effective radius, and what it does to the energy, <= 0; both over
-  ///   the effective mass
-  template <class Scene>
-  [[gnu::always_inline]] inline std::pair<Vector3<S>, S> resistTurn(const Scene& scene, std::uint32_t first,
-                                                                    std::uint32_t second,
-                                                                    const ImpactMeeting<S>& at,
-                                                                    const MassShares<S>& share, const S& dv_n,
-                                                                    const S& t) {
+  /// What surfaces do to each other in a blow: friction, and resistance to rolling and spinning. Of the
+  /// second side, over the effective mass.
+  struct Grip {
+    Vector3<S> dv_t = Vector3<S>::Zero();  ///< across the normal
+    Vector3<S> l = Vector3<S>::Zero();     ///< angular impulse over the effective radius
+    S q1 = S(0);                           ///< effective radius / radius
+    S q2 = S(0);
+    S work = S(0);  ///< of both, less that of dv_t on what supports bodies
+  };
+
+  /// \param slip [m s^-1] across n \param dv_n [m s^-1] of the blow, along the normal
+  /// \param restitution  of the slip. Friction that flings it back acts first, and resistance on what turn
+  /// that
+  ///   leaves: stopped together, a turn could give a slip more energy than it lost.
+  static Grip gripOf(const ImpactMeeting<S>& at, bool boundary, const MassShares<S>& share,
+                     const Vector3<S>& slip, const S& dv_n, const S& restitution) {
     const auto& [one, two, n, distance, a_n, drift, lead, material] = at;
-    const bool boundary = second == staticPartner;
-    Vector3<S> l = Vector3<S>::Zero();
-    if (!(material.rollingFriction > S(0)) && !(material.spinningFriction > S(0))) {
-      return {l, S(0)};
+    Grip grip;
+    const S spin1 = share.first * one.spin;
+    const S spin2 = share.second * two.spin;
+    const bool turns = material.rollingFriction > S(0) || material.spinningFriction > S(0);
+    if (turns) {
+      grip.q1 = boundary ? S(1) : S(two.r / (one.r + two.r));
+      grip.q2 = boundary ? S(0) : S(one.r / (one.r + two.r));
     }
-    const S q1 = boundary ? S(1) : S(two.r / (one.r + two.r));
-    const S q2 = boundary ? S(0) : S(one.r / (one.r + two.r));
-    const S mobility = share.first * one.spin * q1 * q1 + share.second * two.spin * q2 * q2;
-    if (!(mobility > S(0))) {
-      return {l, S(0)};
+    const auto m = SlipAndTurn<S>::of(S(1), one.c, grip.q1, spin1, two.c, grip.q2, spin2);
+    const bool rubs = material.staticFriction > S(0) && dv_n > S(0);
+    const bool resists = m.turn > S(0);
+    const Vector3<S> rho = grip.q2 * two.s - grip.q1 * one.s;
+    const auto rhoAfter = [&] { return Vector3<S>(rho + m.both * at.n.cross(grip.dv_t)); };
+    if (rubs && resists && !(restitution > S(0))) {
+      const auto both =
+          stopSlipAndTurn<S>(m, slip, rho, n, dv_n, material.staticFriction, material.kineticFriction,
+                             material.rollingFriction, material.spinningFriction);
+      grip.dv_t = both.tangential;
+      grip.l = both.turning;
+    } else {
+      if (rubs) {
+        grip.dv_t = tangentialImpulse<S>(S(1) / m.slip, slip, dv_n, material.staticFriction,
+                                         material.kineticFriction, restitution);
+      }
+      if (resists) {
+        grip.l = resistTurning<S>(Vector3<S>(rhoAfter() / -m.turn), n, dv_n, material.rollingFriction,
+                                  material.spinningFriction);
+      }
     }
-    const Vector3<S> s1 = one.r * scene.spin(first, t);
-    const Vector3<S> s2 = boundary ? Vector3<S>(Vector3<S>::Zero()) : two.r * scene.spin(second, t);
-    const Vector3<S> rho = q2 * s2 - q1 * s1;
-    l = resistTurning<S>(Vector3<S>(rho / -mobility), n, dv_n, material.rollingFriction,
-                         material.spinningFriction);
-    twist(scene, first, share.first * q1 * one.spin, l, t);
-    if (!boundary) {
-      twist(scene, second, -share.second * q2 * two.spin, l, t);
-    }
-    return {l, l.dot(rho) + mobility * l.squaredNorm() / S(2)};
+    const Vector3<S> supported = two.supported - one.supported;
+    grip.work = grip.dv_t.dot(Vector3<S>(slip + (m.slip / S(2)) * grip.dv_t - supported)) +
+                grip.l.dot(Vector3<S>(rhoAfter() + (m.turn / S(2)) * grip.l));
+    return grip;
   }
 
   /// From t on the body turns as if it had begun the step with spin w.

@@ -45,7 +45,6 @@ class ImpactEvents : private detail::ImpactCourses<S> {
   using Base::predictAll;
   using Base::queue_;
   using Base::remember;
-  using Base::resistTurn;
   using Base::struck_;
   using Base::swept_;
   using Base::turns_;
@@ -273,33 +272,26 @@ class ImpactEvents : private detail::ImpactCourses<S> {
 
     const MassShares<S> share = massShares<S>(one.mass, one.movable, two.mass, two.movable);
     const S dv_n = target - v_n;
-    const S mobility =
-        S(1) + share.first * one.spin * one.c * one.c + share.second * two.spin * two.c * two.c;
     const Vector3<S> slip = v_rel - v_n * n - Vector3<S>(one.c * one.s + two.c * two.s).cross(n);
-    Vector3<S> dv_t = Vector3<S>::Zero();
-    if (material.staticFriction > S(0) && dv_n > S(0)) {
-      dv_t = tangentialImpulse<S>(S(1) / mobility, slip, dv_n, material.staticFriction,
-                                  material.kineticFriction, bounces ? material.tangentialRestitution : S(0));
-    }
+    const auto [dv_t, l, q1, q2, gripWork] =
+        Base::gripOf(*at, boundary, share, slip, dv_n, bounces ? material.tangentialRestitution : S(0));
     // In two strokes, stop and rebound: a head-on blow then ends at exactly e times its speed.
     const std::array<Vector3<S>, 3> strokes{S(-v_n) * n, target * n, dv_t};
     if (share.first > S(0)) {
       scene.course.push(scene.bodies, event.first, S(-share.first), strokes, t);
     }
-    twist(scene, event.first, share.first * one.c * one.spin, n.cross(dv_t), t);
+    const Vector3<S> torque = n.cross(dv_t);
+    twist(scene, event.first, share.first * one.spin, Vector3<S>(one.c * torque + q1 * l), t);
     if (!boundary) {
       if (share.second > S(0)) {
         scene.course.push(scene.bodies, event.second, share.second, strokes, t);
       }
-      twist(scene, event.second, share.second * two.c * two.spin, n.cross(dv_t), t);
+      twist(scene, event.second, share.second * two.spin, Vector3<S>(two.c * torque - q2 * l), t);
     }
-    const auto [l, turned] = resistTurn(scene, event.first, event.second, *at, share, dv_n, t);
     const S& m = share.effective;
-    const Vector3<S> slipAfter = slip + mobility * dv_t;
-    const Vector3<S> supported = two.supported - one.supported;
-    report.restitutionLoss -= m * dv_n * ((v_n + target) / S(2) - n.dot(supported));
-    report.frictionLoss -=
-        m * (dv_t.dot(Vector3<S>(Vector3<S>(slip + slipAfter) / S(2) - supported)) + turned);
+    report.restitutionLoss -=
+        m * dv_n * ((v_n + target) / S(2) - n.dot(Vector3<S>(two.supported - one.supported)));
+    report.frictionLoss -= m * gripWork;
     report.driftWork -= m * Vector3<S>(dv_n * n + dv_t).dot(drift);
     impacts_.push_back({event.first,
                         event.second,

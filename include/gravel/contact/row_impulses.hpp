@@ -40,18 +40,18 @@ struct RowImpulses {
       row.jt = row.jt + step.t;
       row.l = row.l + step.l;
     }
-    const RowChanges<S> changes = problem.change(group, row, b1, b2);
-    push(b1, b2, changes.dj * row.n + changes.dt);
-    if (problem.friction) {
-      if (problem.grips) {
-        mark(problem, group, changes, problem.atOnce);
-      }
-      twist(row, b1, b2, changes.dt);
-    }
+    RowChanges<S> changes = problem.change(group, row, b1, b2);
     TurningChanges<S> turned;
     if (!problem.turning.empty()) {
-      turned = TurningLanes<S>::load(problem.turning, group).resist(row, b1, b2);
-      turn(b1, b2, turned);
+      turned = problem.changeTurn(group, row, b1, b2, problem.slidesOf(group), changes);
+    } else {
+      push(b1, b2, changes.dj * row.n + changes.dt);
+      if (problem.friction) {
+        twist(row, b1, b2, changes.dt);
+      }
+    }
+    if (problem.friction && problem.grips) {
+      mark(problem, group, changes, problem.atOnce);
     }
     b1.store(problem.bodies, group.slot1, problem.friction);
     b2.store(problem.bodies, group.slot2, problem.friction);
@@ -94,8 +94,9 @@ struct RowImpulses {
     }
   }
 
-  /// Friction of row k alone, for its normal impulse.
-  static Progress rub(ContactProblem<S>& problem, const ContactColoring& colouring, std::size_t k) {
+  /// Friction and resistance to turning of row k alone, for its normal impulse.
+  /// \return whether that is all: if not, they are to be taken again, by turns
+  static bool rub(ContactProblem<S>& problem, const ContactColoring& colouring, std::size_t k) {
     const Group group = Group::from(colouring.rows(), k, k + 1, colouring.staticSlot());
     Lanes row = problem.load(group, true);
     auto b1 = BodyLanes<S>::load(problem.bodies, group.slot1);
@@ -104,29 +105,25 @@ struct RowImpulses {
     RowChanges<S> changes;
     const typename Packed<S>::Truth no = Packed<S>::zero() > Packed<S>::zero();
     const bool tired = problem.marks[k].slides >= RowMark::patience;
-    rubRight(row, b1, b2, problem.slipOf(group, slipVelocity(row, v_rel, row.n.dot(v_rel), b1, b2)),
-             RowSlides<S>{!no, tired ? !no : no}, changes);
+    const RowSlides<S> sliding{!no, tired ? !no : no};
+    rubRight(row, b1, b2, problem.slipOf(group, slipVelocity(row, v_rel, row.n.dot(v_rel), b1, b2)), sliding,
+             changes);
+    bool right = true;
+    if (problem.turning.empty()) {
+      push(b1, b2, changes.dt);
+      twist(row, b1, b2, changes.dt);
+    } else {
+      const auto turned = problem.changeTurn(group, row, b1, b2, sliding, changes);
+      const S speed = maxAbs(b1.s.at(0)) + maxAbs(b2.s.at(0)) + maxAbs(b1.v.at(0)) + maxAbs(b2.v.at(0));
+      const S enough = Eigen::NumTraits<S>::epsilon() * speed;
+      const Pack change_sq = largerOf(changes.du.squaredNorm(), turned.d_rho.squaredNorm());
+      right = turned.right[0] || !(change_sq[0] > enough * enough);
+    }
     mark(problem, group, changes, true);
-    push(b1, b2, changes.dt);
-    twist(row, b1, b2, changes.dt);
     problem.storeImpulses(group, row);
     b1.store(problem.bodies, group.slot1, true);
     b2.store(problem.bodies, group.slot2, true);
-    return {changes.du.squaredNorm()[0]};
-  }
-
-  /// Resistance to turning of row k alone, for its normal impulse.
-  static Progress resist(ContactProblem<S>& problem, const ContactColoring& colouring, std::size_t k) {
-    const Group group = Group::from(colouring.rows(), k, k + 1, colouring.staticSlot());
-    Lanes row = problem.load(group, true);
-    auto b1 = BodyLanes<S>::load(problem.bodies, group.slot1);
-    auto b2 = BodyLanes<S>::load(problem.bodies, group.slot2);
-    const auto changes = TurningLanes<S>::load(problem.turning, group).resist(row, b1, b2);
-    turn(b1, b2, changes);
-    problem.storeImpulses(group, row);
-    b1.store(problem.bodies, group.slot1, true);
-    b2.store(problem.bodies, group.slot2, true);
-    return {changes.d_rho.squaredNorm()[0]};
+    return right;
   }
 
   /// Takes down how far bodies were moved at most.

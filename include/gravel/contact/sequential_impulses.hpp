@@ -30,7 +30,6 @@ namespace gravel {
 template <Real S>
 class SequentialImpulses : private detail::RowImpulses<S> {
   using Base = detail::RowImpulses<S>;
-  using Base::resist;
   using Base::rub;
   using typename Base::Body;
   using typename Base::Group;
@@ -156,23 +155,9 @@ class SequentialImpulses : private detail::RowImpulses<S> {
         b2.v += (share2 * dv) * row.n;
       }
     }
-    if (row.stick > S(0)) {
-      rub(problem, colouring, k);
-    }
-    if (!problem.turning.empty()) {
-      // Friction and resistance act on one spin: in turns, each taking k/(1 + k) off what is left, 2/7 of a
-      // homogeneous sphere. For k <= 0.1 they end too early, and something creeps (docs/theory-contact.md).
-      const S speed =
-          detail::maxAbs(b1.s) + detail::maxAbs(b2.s) + detail::maxAbs(b1.v) + detail::maxAbs(b2.v);
-      const S enough = Eigen::NumTraits<S>::epsilon() * speed;
-      for (int turn = 0; turn < 200; ++turn) {
-        Progress progress = resist(problem, colouring, k);
-        if (row.stick > S(0)) {
-          progress += rub(problem, colouring, k);
-        }
-        if (!(progress.change_sq > enough * enough)) {
-          break;
-        }
+    if (row.stick > S(0) || !problem.turning.empty()) {
+      int turns = 0;
+      while (!rub(problem, colouring, k) && ++turns < 200) {
       }
     }
   }

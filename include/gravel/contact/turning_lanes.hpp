@@ -1,9 +1,11 @@
 #pragma once
 
 /// \file
-/// Resistance to rolling and spinning of rows in lanes: the units and the law are those of resistTurning().
+/// Resistance to rolling and spinning of rows in lanes: the units and the law are those of resistTurning(),
+/// beside friction those of stopSlipAndTurn().
 
 #include <gravel/contact/row_lanes.hpp>
+#include <gravel/contact/slip_and_turn.hpp>
 
 #include <limits>
 #include <vector>
@@ -33,7 +35,15 @@ struct TurningChanges {
   V d_rho = V::zero();
   V ds1 = V::zero();
   V ds2 = V::zero();
+  typename Packed<S>::Truth right = {};  ///< beside friction, which is so too
 };
+
+template <Real S>
+[[gnu::always_inline]] inline void turn(BodyLanes<S>& b1, BodyLanes<S>& b2,
+                                        const TurningChanges<S>& changes) {
+  b1.s = b1.s + changes.ds1;
+  b2.s = b2.s + changes.ds2;
+}
 
 template <Real S>
 struct TurningLanes {
@@ -54,6 +64,18 @@ struct TurningLanes {
     return q2 * b2.s - q1 * b1.s;
   }
 
+  /// What is longer than `most` made as long as `kept`.
+  [[gnu::always_inline]] static inline V cut(const V& wanted, const P& most, const P& kept) {
+    const P size_sq = wanted.squaredNorm();
+    const auto longer = size_sq > most * most;
+    if (!longer.any()) {
+      return wanted;
+    }
+    // Roots of lanes may take subnormal numbers for 0.
+    const P size = squareRoot(largerOf(size_sq, P::all(std::numeric_limits<S>::min())));
+    return choose(longer, kept / size, P::all(S(1))) * wanted;
+  }
+
   /// `wanted` within what the load of `row` allows; see resistTurning().
   [[gnu::always_inline]] inline V within(const RowLanes<S>& row, const V& wanted) const {
     const P zero = P::zero();
@@ -65,11 +87,7 @@ struct TurningLanes {
       return kept * row.n;
     }
     const V across = wanted - along * row.n;
-    const P size_sq = across.squaredNorm();
-    // Roots of lanes may take subnormal numbers for 0.
-    const P size = squareRoot(largerOf(size_sq, P::all(std::numeric_limits<S>::min())));
-    const P share = choose(size_sq > most * most, most / size, P::all(S(1)));
-    return share * across + kept * row.n;
+    return cut(across, most, most) + kept * row.n;
   }
 
   /// What a change dl of the impulse does: dl on the second bodies, its opposite on the first.
@@ -89,13 +107,57 @@ struct TurningLanes {
     row.l = choose(mobility > P::zero(), within(row, stops), V::zero());
     return by(row.l - before, b1, b2);
   }
-};
 
-template <Real S>
-[[gnu::always_inline]] inline void turn(BodyLanes<S>& b1, BodyLanes<S>& b2,
-                                        const TurningChanges<S>& changes) {
-  b1.s = b1.s + changes.ds1;
-  b2.s = b2.s + changes.ds2;
-}
+  /// Friction and resistance of `row` become right together while all others stand, but where both come to
+  /// their limits: there they stay as they are, and what calls takes them by turns.
+  /// \param slip that is to vanish \param changes,turned  of this row so far: what is done is added
+  [[gnu::always_inline]] inline void stopTogether(RowLanes<S>& row, BodyLanes<S>& b1, BodyLanes<S>& b2,
+                                                  const V& slip, const RowSlides<S>& sliding,
+                                                  RowChanges<S>& changes, TurningChanges<S>& turned) const {
+    const P zero = P::zero();
+    const auto m = SlipAndTurn<P>::of(normalMobility(b1, b2), row.c1, q1, b1.spin, row.c2, q2, b2.spin);
+    const auto across = [&](const V& v) { return v - row.n.dot(v) * row.n; };
+    const V rho_t = across(rho(b1, b2));
+    const V l = across(row.l);
+    const P load = choose(row.jn > zero, row.jn, zero);
+    const P rubbed = smallerOf(load, sliding.mostLoad);
+    const P most = choose(sliding.tired, row.slide, row.stick) * rubbed;
+    const P mostTurn = rolling * load;
+    const auto both = changes.rubs & (m.turn > zero);
+    const P per_D = reciprocalOf(m.det);
+
+    // Friction is free.
+    V dl = cut(l + per_D * (m.both * row.n.cross(slip) - m.slip * rho_t), mostTurn, mostTurn) - l;
+    V dt = -reciprocalOf(m.slip) * (slip + m.both * dl.cross(row.n));
+    const auto slides = both & ((row.jt + dt).squaredNorm() > most * most);
+    auto right = both & !slides;
+    if (slides.any()) {  // resistance is
+      const P limit = choose(sliding.kinetic, row.slide, row.stick) * rubbed;
+      const V stops = row.jt + per_D * (m.both * rho_t.cross(row.n) - m.turn * slip);
+      const V dt_slides = cut(stops, most, limit) - row.jt;
+      const V dl_slides = -reciprocalOf(m.turn) * (rho_t + m.both * row.n.cross(dt_slides));
+      right = both & !(slides & ((l + dl_slides).squaredNorm() > mostTurn * mostTurn));
+      dt = choose(slides, dt_slides, dt);
+      dl = choose(slides, dl_slides, dl);
+    }
+    dt = choose(right, dt, V::zero());
+    dl = choose(right, dl, V::zero());
+    row.jt = row.jt + dt;
+    row.l = row.l + dl;
+    push(b1, b2, dt);
+    twist(row, b1, b2, dt);
+    const TurningChanges<S> more = by(dl, b1, b2);
+    turn(b1, b2, more);
+    changes.dt = changes.dt + dt;
+    changes.slides = (right & slides) | (changes.slides & !right);
+    turned.dl = turned.dl + dl;
+    turned.ds1 = turned.ds1 + more.ds1;
+    turned.ds2 = turned.ds2 + more.ds2;
+    // What both did to the slip and to the turn.
+    changes.du = choose(right, m.slip * changes.dt + m.both * turned.dl.cross(row.n), changes.du);
+    turned.d_rho = choose(right, m.turn * turned.dl + m.both * row.n.cross(changes.dt), turned.d_rho);
+    turned.right = right;
+  }
+};
 
 }  // namespace gravel::detail

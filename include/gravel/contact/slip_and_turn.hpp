@@ -1,0 +1,96 @@
+#pragma once
+
+/// \file
+/// Friction and resistance to rolling act on one spin: what stops the slip turns the bodies, and what stops
+/// their turn lets them slip. Both of one contact together, in closed form.
+///
+/// With the units of impulses.hpp, an impulse j across the normal n and an angular impulse l across it,
+///     slip' = slip + A j + X l x n,        A = 1/m1 + 1/m2 + c1^2/(k1 m1) + c2^2/(k2 m2)
+///     rho'  = rho  + C l + X n x j,        C =               q1^2/(k1 m1) + q2^2/(k2 m2)
+///                                          X =              c1 q1/(k1 m1) - c2 q2/(k2 m2),
+/// which is symmetric in j and n x l. It is X = 0 for equal spheres; on a plane X^2/(A C) = 1/(1 + k), so
+/// that to stop slip and turn by turns leaves 1 - k of both each time, however far away the limits are.
+/// Together they vanish with
+///     D j = X rho x n - C slip,            D l = X n x slip - A rho,
+///     D = A C - X^2 = (1/m1 + 1/m2) C + (c1 q2 + c2 q1)^2/(k1 m1 k2 m2),
+/// in which nothing cancels. Of j and l, within a circle each, the law wants the least energy (maximum
+/// dissipation). If one of the two is free, the other feels the mobility D/C or D/A, the same in all
+/// directions: it is the above, cut to its circle. So three closed forms serve all but contacts with both at
+/// their limits; for these the two are taken by turns, of which each lowers the energy.
+
+#include <gravel/contact/impulses.hpp>
+
+namespace gravel {
+
+namespace detail {
+
+/// A, X, C and D above. \tparam N a scalar, or Packed
+template <class N>
+struct SlipAndTurn {
+  N slip;  ///< A
+  N both;  ///< X
+  N turn;  ///< C
+  N det;   ///< D
+
+  /// \param normal 1/m1 + 1/m2 \param spin1,spin2 1/(k m)
+  [[gnu::always_inline]] static inline SlipAndTurn of(const N& normal, const N& c1, const N& q1,
+                                                      const N& spin1, const N& c2, const N& q2,
+                                                      const N& spin2) {
+    const N turn = q1 * q1 * spin1 + q2 * q2 * spin2;
+    const N cross = c1 * q2 + c2 * q1;
+    return {normal + spin1 * c1 * c1 + spin2 * c2 * c2, c1 * q1 * spin1 - c2 * q2 * spin2, turn,
+            normal * turn + cross * cross * spin1 * spin2};
+  }
+};
+
+}  // namespace detail
+
+/// What friction and resistance to turning of one blow do together.
+template <Real Scalar>
+struct SlipAndTurnImpulses {
+  Vector3<Scalar> tangential;  ///< [N s] on body 2
+  Vector3<Scalar> turning;     ///< [N s] angular impulse on body 2 over the effective radius
+};
+
+/// Both within their limits: see tangentialImpulse() and resistTurning(), which they are where the bodies'
+/// mobilities do not couple them. It never adds energy.
+/// \param slip [m s^-1] across n
+/// \param rho [m s^-1] of the relative turn
+template <Real Scalar>
+SlipAndTurnImpulses<Scalar> stopSlipAndTurn(const detail::SlipAndTurn<Scalar>& mobility,
+                                            const Vector3<Scalar>& slip, const Vector3<Scalar>& rho,
+                                            const Vector3<Scalar>& n, const Scalar& jn, const Scalar& mu_s,
+                                            const Scalar& mu_k, const Scalar& mu_r, const Scalar& mu_spin) {
+  using V = Vector3<Scalar>;
+  const Scalar& A = mobility.slip;
+  const Scalar& X = mobility.both;
+  const Scalar& C = mobility.turn;
+  const Scalar& D = mobility.det;
+  const V spun = n.dot(rho) * n;
+  // What is wanted of the one beside the other.
+  const auto rubs = [&](const V& l) { return V((slip + X * l.cross(n)) / -A); };
+  const auto turns = [&](const V& j) { return V((rho + X * n.cross(j)) / -C); };
+  const auto within = [&](const V& l) { return resistTurning<Scalar>(l, n, jn, mu_r, mu_spin); };
+  const V turning = within(V((X * n.cross(slip) - A * (rho - spun)) / D - spun / C));
+  const V sticking = rubs(turning);
+  if (detail::safeNorm(sticking) <= mu_s * jn) {
+    return {sticking, turning};
+  }
+  V j = clampToCone<Scalar>(V((X * rho.cross(n) - C * slip) / D), jn, mu_s, mu_k);
+  V l = turns(j);
+  if (detail::safeNorm(V(l - n.dot(l) * n)) <= mu_r * jn) {
+    return {j, within(l)};
+  }
+  for (int turn = 0; turn < 200; ++turn) {
+    l = within(turns(j));
+    const V next = clampToCone<Scalar>(rubs(l), jn, mu_s, mu_k);
+    const bool stays = detail::maxAbs(V(next - j)) <= Eigen::NumTraits<Scalar>::epsilon() * mu_s * jn;
+    j = next;
+    if (stays) {
+      break;
+    }
+  }
+  return {j, within(turns(j))};
+}
+
+}  // namespace gravel
