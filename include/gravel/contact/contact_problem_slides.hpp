@@ -109,8 +109,23 @@ void ContactProblem<S>::aimSlip(const Taking<B>& taking, const Group& group, std
     const auto& b1 = initial[group.slot1[lane]];
     const auto& b2 = initial[group.slot2[lane]];
     const Vector3<S> v_rel = b2.v - b1.v;
-    const Vector3<S> slip = detail::slipVelocity(row, v_rel, S(row.n.dot(v_rel)), b1, b2);
-    slipTarget -= restored * Vector3<S>(slip - slipTarget);
+    const S v_n = row.n.dot(v_rel);
+    const Vector3<S> slip = Vector3<S>(detail::slipVelocity(row, v_rel, v_n, b1, b2)) - slipTarget;
+    slipTarget -= restored * slip;
+    if (!turning.empty()) {  // as in a blow by itself resistance acts afterwards, and lets it slip
+      const Body& m1 = bodies[group.slot1[lane]];
+      const Body& m2 = bodies[group.slot2[lane]];
+      const detail::TurningRow<S>& resists = turning[k];
+      const S mobility = detail::normalMobility(m1, m2);
+      const auto m =
+          detail::SlipAndTurn<S>::of(mobility, row.c1, resists.q1, m1.spin, row.c2, resists.q2, m2.spin);
+      const Vector3<S> j = (-(S(1) + restored) * detail::reciprocal<S>(m.slip)) * slip;
+      const Vector3<S> rho = resists.q2 * b2.s - resists.q1 * b1.s + m.both * row.n.cross(j);
+      const S jn = detail::reciprocal<S>(mobility) * (rowLanes.target[lane] - v_n);
+      slipTarget += m.both * resistTurning<S>(Vector3<S>(-detail::reciprocal<S>(m.turn) * rho), row.n, jn,
+                                              resists.rolling, resists.spinning)
+                                 .cross(row.n);
+    }
   }
 }
 
