@@ -55,7 +55,10 @@ TEMPLATE_TEST_CASE("rows side by side resist turning as each does by itself", ""
     row.jn = detail::Packed<S>::of([&](std::size_t lane) { return load[lane]; });
     auto b1 = detail::BodyLanes<S>::load(bodies, group.slot1);
     auto b2 = detail::BodyLanes<S>::load(bodies, group.slot2);
-    const auto changes = detail::TurningLanes<S>::load(turning, group).resist(row, b1, b2);
+    const auto no = row.jn < row.jn;
+    detail::RowChanges<S> rubbed;
+    const auto changes = detail::TurningLanes<S>::load(turning, group)
+                             .rubAndResist(row, b1, b2, detail::PackedVector<S>::zero(), {no, no}, rubbed);
     turn(b1, b2, changes);
     for (std::size_t lane = 0; lane < width; ++lane) {
       const auto& [q1, q2, rolling, spinning] = turning[lane];
@@ -223,17 +226,14 @@ TEMPLATE_TEST_CASE("rows side by side stop slip and turn as each does by itself"
     row.jn = P::of([&](std::size_t lane) { return contacts[lane].jn; });
     auto b1 = detail::BodyLanes<S>::load(bodies, group.slot1);
     auto b2 = detail::BodyLanes<S>::load(bodies, group.slot2);
-    const auto turns = detail::TurningLanes<S>::load(turning, group);
     const auto slip = lanes([&](std::size_t lane) { return contacts[lane].after(j[lane], l[lane]).slip(); });
-    const auto no = P::zero() > P::zero();
+    const auto no = row.jn < row.jn;
     detail::RowChanges<S> changes;
-    changes.rubs = !no;
-    changes.slides = no;
-    // As sweeps do: the resistance alone first, here of what turns about the normal.
-    auto turned = turns.resist(row, b1, b2);
+    const auto turned =
+        detail::TurningLanes<S>::load(turning, group).rubAndResist(row, b1, b2, slip, {!no, no}, changes);
+    push(b1, b2, changes.dt);
+    twist(row, b1, b2, changes.dt);
     turn(b1, b2, turned);
-    const detail::PackedVector<S> v = b2.v - b1.v;
-    turns.stopTogether(row, b1, b2, slipVelocity(row, v, row.n.dot(v), b1, b2), {!no, no}, changes, turned);
     for (std::size_t lane = 0; lane < width; ++lane) {
       const auto& contact = contacts[lane];
       const auto [stopping, resisting] = contact.stopped();
@@ -256,6 +256,14 @@ TEMPLATE_TEST_CASE("rows side by side stop slip and turn as each does by itself"
         CHECK((row.l.at(lane) - resisting).norm() <= rounding * size);
         CHECK((changes.du.at(lane) - V(after.slip() - slip.at(lane))).norm() <= rounding * speed);
         CHECK(changes.slides[lane] == contact.atLimit(stopping, contact.row.slide));
+      } else {  // one after the other
+        const auto m = contact.mobility();
+        const V j1 = clampToCone<S>(V(j[lane] - slip.at(lane) / m.slip), contact.jn, contact.row.stick,
+                                    contact.row.slide);
+        const V l1 = resistTurning<S>(V(l[lane] - contact.after(j1, l[lane]).rho() / m.turn), contact.row.n,
+                                      contact.jn, contact.turning.rolling, contact.turning.spinning);
+        CHECK((row.jt.at(lane) - j1).norm() <= rounding * size);
+        CHECK((row.l.at(lane) - l1).norm() <= rounding * size);
       }
     }
   }

@@ -32,6 +32,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
   using Pack = detail::Packed<S>;
   using Group = detail::RowGroup<S>;
   using Lanes = detail::RowLanes<S>;
+  using Turned = detail::TurningChanges<S>;
   using Base::again;
   using Base::bodies;
   using Base::friction;
@@ -133,17 +134,17 @@ class ContactProblem : public detail::ProblemBodies<S> {
 
   /// Makes these rows right while all others stand. The normal impulse leaves the slip as it is, so that both
   /// are found from the same velocities.
+  /// \param turned  what resists turning does; none without it
   [[gnu::always_inline]] inline detail::RowChanges<S> change(const Group& group, Lanes& row,
                                                              const detail::BodyLanes<S>& b1,
-                                                             const detail::BodyLanes<S>& b2) const;
-
-  /// The same of what resists turning, and of friction beside it. \param changes  of change(), which bodies
-  /// get
-  [[gnu::always_inline]] inline detail::TurningChanges<S> changeTurn(const Group& group, Lanes& row,
-                                                                     detail::BodyLanes<S>& b1,
-                                                                     detail::BodyLanes<S>& b2,
-                                                                     const detail::RowSlides<S>& sliding,
-                                                                     detail::RowChanges<S>& changes) const;
+                                                             const detail::BodyLanes<S>& b2,
+                                                             Turned& turned) const;
+  /// The same for the normal impulse that they have.
+  [[gnu::always_inline]] inline Turned rub(const Group& group, Lanes& row, const detail::BodyLanes<S>& b1,
+                                           const detail::BodyLanes<S>& b2,
+                                           const detail::PackedVector<S>& slip,
+                                           const detail::RowSlides<S>& sliding,
+                                           detail::RowChanges<S>& changes) const;
 
   /// The part of this slip that is to vanish.
   [[gnu::always_inline]] inline detail::PackedVector<S> slipOf(const Group& group,

@@ -32,14 +32,11 @@ inline detail::RowSlides<S> ContactProblem<S>::slidesOf(const Group& group) cons
 template <Real S>
 inline auto ContactProblem<S>::wrongAt(const Group& group, const Lanes& present) const -> Pack {
   Lanes row = present;
-  auto b1 = detail::BodyLanes<S>::load(bodies, group.slot1);
-  auto b2 = detail::BodyLanes<S>::load(bodies, group.slot2);
-  auto changes = change(group, row, b1, b2);
-  Pack wrong = changes.change_sq();
-  if (!turning.empty()) {
-    const auto turned = changeTurn(group, row, b1, b2, slidesOf(group), changes);
-    wrong = largerOf(changes.change_sq(), turned.d_rho.squaredNorm());
-  }
+  const auto b1 = detail::BodyLanes<S>::load(bodies, group.slot1);
+  const auto b2 = detail::BodyLanes<S>::load(bodies, group.slot2);
+  Turned turned;
+  const auto changes = change(group, row, b1, b2, turned);
+  const Pack wrong = largerOf(changes.change_sq(), turned.d_rho.squaredNorm());
   if (!grips) {
     return wrong;
   }
@@ -48,36 +45,31 @@ inline auto ContactProblem<S>::wrongAt(const Group& group, const Lanes& present)
 }
 
 template <Real S>
-inline detail::RowChanges<S> ContactProblem<S>::change(const Group& group, Lanes& row,
-                                                       const detail::BodyLanes<S>& b1,
-                                                       const detail::BodyLanes<S>& b2) const {
+inline auto ContactProblem<S>::change(const Group& group, Lanes& row, const detail::BodyLanes<S>& b1,
+                                      const detail::BodyLanes<S>& b2, Turned& turned) const
+    -> detail::RowChanges<S> {
   detail::RowChanges<S> changes;
   const detail::PackedVector<S> v_rel = b2.v - b1.v;
   const Pack v_n = row.n.dot(v_rel);
   pushRight(row, b1, b2, v_n, changes);
+  changes.rubs = changes.slides = Pack::zero() > Pack::zero();
   if (friction) {
-    rubRight(row, b1, b2, slipOf(group, slipVelocity(row, v_rel, v_n, b1, b2)), slidesOf(group), changes);
-  } else {
-    changes.rubs = changes.slides = Pack::zero() > Pack::zero();
+    turned = rub(group, row, b1, b2, slipVelocity(row, v_rel, v_n, b1, b2), slidesOf(group), changes);
   }
   return changes;
 }
 
 template <Real S>
-inline auto ContactProblem<S>::changeTurn(const Group& group, Lanes& row, detail::BodyLanes<S>& b1,
-                                          detail::BodyLanes<S>& b2, const detail::RowSlides<S>& sliding,
-                                          detail::RowChanges<S>& changes) const -> detail::TurningChanges<S> {
-  const auto lanes = detail::TurningLanes<S>::load(turning, group);
-  push(b1, b2, changes.dj * row.n + changes.dt);
-  twist(row, b1, b2, changes.dt);
-  auto turned = lanes.resist(row, b1, b2);
-  turn(b1, b2, turned);
-  if (friction) {
-    const detail::PackedVector<S> v_rel = b2.v - b1.v;
-    const auto slip = slipOf(group, slipVelocity(row, v_rel, row.n.dot(v_rel), b1, b2));
-    lanes.stopTogether(row, b1, b2, slip, sliding, changes, turned);
+inline auto ContactProblem<S>::rub(const Group& group, Lanes& row, const detail::BodyLanes<S>& b1,
+                                   const detail::BodyLanes<S>& b2, const detail::PackedVector<S>& slip,
+                                   const detail::RowSlides<S>& sliding, detail::RowChanges<S>& changes) const
+    -> Turned {
+  if (!turning.empty()) {
+    const auto lanes = detail::TurningLanes<S>::load(turning, group);
+    return lanes.rubAndResist(row, b1, b2, slipOf(group, slip), sliding, changes);
   }
-  return turned;
+  rubRight(row, b1, b2, slipOf(group, slip), sliding, changes);
+  return {};
 }
 
 template <Real S>

@@ -40,18 +40,17 @@ struct RowImpulses {
       row.jt = row.jt + step.t;
       row.l = row.l + step.l;
     }
-    RowChanges<S> changes = problem.change(group, row, b1, b2);
     TurningChanges<S> turned;
-    if (!problem.turning.empty()) {
-      turned = problem.changeTurn(group, row, b1, b2, problem.slidesOf(group), changes);
-    } else {
-      push(b1, b2, changes.dj * row.n + changes.dt);
-      if (problem.friction) {
-        twist(row, b1, b2, changes.dt);
+    const RowChanges<S> changes = problem.change(group, row, b1, b2, turned);
+    push(b1, b2, changes.dj * row.n + changes.dt);
+    if (problem.friction) {
+      if (problem.grips) {
+        mark(problem, group, changes, problem.atOnce);
       }
+      twist(row, b1, b2, changes.dt);
     }
-    if (problem.friction && problem.grips) {
-      mark(problem, group, changes, problem.atOnce);
+    if (!problem.turning.empty()) {
+      turn(b1, b2, turned);
     }
     b1.store(problem.bodies, group.slot1, problem.friction);
     b2.store(problem.bodies, group.slot2, problem.friction);
@@ -106,18 +105,17 @@ struct RowImpulses {
     const typename Packed<S>::Truth no = Packed<S>::zero() > Packed<S>::zero();
     const bool tired = problem.marks[k].slides >= RowMark::patience;
     const RowSlides<S> sliding{!no, tired ? !no : no};
-    rubRight(row, b1, b2, problem.slipOf(group, slipVelocity(row, v_rel, row.n.dot(v_rel), b1, b2)), sliding,
-             changes);
+    const auto turned =
+        problem.rub(group, row, b1, b2, slipVelocity(row, v_rel, row.n.dot(v_rel), b1, b2), sliding, changes);
+    push(b1, b2, changes.dt);
+    twist(row, b1, b2, changes.dt);
+    turn(b1, b2, turned);
     bool right = true;
-    if (problem.turning.empty()) {
-      push(b1, b2, changes.dt);
-      twist(row, b1, b2, changes.dt);
-    } else {
-      const auto turned = problem.changeTurn(group, row, b1, b2, sliding, changes);
+    if (!problem.turning.empty() && !turned.right[0]) {
       const S speed = maxAbs(b1.s.at(0)) + maxAbs(b2.s.at(0)) + maxAbs(b1.v.at(0)) + maxAbs(b2.v.at(0));
       const S enough = Eigen::NumTraits<S>::epsilon() * speed;
       const Pack change_sq = largerOf(changes.du.squaredNorm(), turned.d_rho.squaredNorm());
-      right = turned.right[0] || !(change_sq[0] > enough * enough);
+      right = !(change_sq[0] > enough * enough);
     }
     mark(problem, group, changes, true);
     problem.storeImpulses(group, row);

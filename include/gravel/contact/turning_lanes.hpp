@@ -98,65 +98,67 @@ struct TurningLanes {
     return {dl, q2 * ds2 - q1 * ds1, ds1, ds2};
   }
 
-  /// The impulse of `row` becomes right while all others stand: it stops the turn, or is at its limit.
-  [[gnu::always_inline]] inline TurningChanges<S> resist(RowLanes<S>& row, const BodyLanes<S>& b1,
-                                                         const BodyLanes<S>& b2) const {
-    const P mobility = q1 * q1 * b1.spin + q2 * q2 * b2.spin;
-    const V before = row.l;
-    const V stops = before - reciprocalOf(mobility) * rho(b1, b2);
-    row.l = choose(mobility > P::zero(), within(row, stops), V::zero());
-    return by(row.l - before, b1, b2);
-  }
-
-  /// Friction and resistance of `row` become right together while all others stand, but where both come to
-  /// their limits: there they stay as they are, and what calls takes them by turns.
-  /// \param slip that is to vanish \param changes,turned  of this row so far: what is done is added
-  [[gnu::always_inline]] inline void stopTogether(RowLanes<S>& row, BodyLanes<S>& b1, BodyLanes<S>& b2,
-                                                  const V& slip, const RowSlides<S>& sliding,
-                                                  RowChanges<S>& changes, TurningChanges<S>& turned) const {
+  /// Friction and resistance of `row` become right while all others stand: together, where at most one of
+  /// them is at its limit then. Else each does by itself, friction first, and they are to be taken again, by
+  /// turns. \param slip that is to vanish
+  [[gnu::always_inline]] inline TurningChanges<S> rubAndResist(RowLanes<S>& row, const BodyLanes<S>& b1,
+                                                               const BodyLanes<S>& b2, const V& slip,
+                                                               const RowSlides<S>& sliding,
+                                                               RowChanges<S>& changes) const {
     const P zero = P::zero();
     const auto m = SlipAndTurn<P>::of(normalMobility(b1, b2), row.c1, q1, b1.spin, row.c2, q2, b2.spin);
-    const auto across = [&](const V& v) { return v - row.n.dot(v) * row.n; };
-    const V rho_t = across(rho(b1, b2));
-    const V l = across(row.l);
+    const P per_C = reciprocalOf(m.turn);
+    const P per_D = reciprocalOf(m.det);
+    const V rho_all = rho(b1, b2);
+    const P rho_n = row.n.dot(rho_all);
+    const P l_n = row.n.dot(row.l);
+    const V rho_t = rho_all - rho_n * row.n;
+    const V l = row.l - l_n * row.n;
     const P load = choose(row.jn > zero, row.jn, zero);
     const P rubbed = smallerOf(load, sliding.mostLoad);
     const P most = choose(sliding.tired, row.slide, row.stick) * rubbed;
     const P mostTurn = rolling * load;
+    changes.rubs = (row.stick > zero) & (m.slip > zero) & ((row.jn > zero) | (row.jt.sumAbs() > zero));
     const auto both = changes.rubs & (m.turn > zero);
-    const P per_D = reciprocalOf(m.det);
 
     // Friction is free.
     V dl = cut(l + per_D * (m.both * row.n.cross(slip) - m.slip * rho_t), mostTurn, mostTurn) - l;
     V dt = -reciprocalOf(m.slip) * (slip + m.both * dl.cross(row.n));
-    const auto slides = both & ((row.jt + dt).squaredNorm() > most * most);
-    auto right = both & !slides;
-    if (slides.any()) {  // resistance is
+    changes.slides = both & ((row.jt + dt).squaredNorm() > most * most);
+    auto right = both & !changes.slides;
+    if (changes.slides.any()) {  // resistance is
       const P limit = choose(sliding.kinetic, row.slide, row.stick) * rubbed;
       const V stops = row.jt + per_D * (m.both * rho_t.cross(row.n) - m.turn * slip);
       const V dt_slides = cut(stops, most, limit) - row.jt;
-      const V dl_slides = -reciprocalOf(m.turn) * (rho_t + m.both * row.n.cross(dt_slides));
-      right = both & !(slides & ((l + dl_slides).squaredNorm() > mostTurn * mostTurn));
-      dt = choose(slides, dt_slides, dt);
-      dl = choose(slides, dl_slides, dl);
+      const V dl_slides = -per_C * (rho_t + m.both * row.n.cross(dt_slides));
+      right = both & !(changes.slides & ((l + dl_slides).squaredNorm() > mostTurn * mostTurn));
+      dt = choose(changes.slides, dt_slides, dt);
+      dl = choose(changes.slides, dl_slides, dl);
     }
     dt = choose(right, dt, V::zero());
     dl = choose(right, dl, V::zero());
-    row.jt = row.jt + dt;
-    row.l = row.l + dl;
-    push(b1, b2, dt);
-    twist(row, b1, b2, dt);
-    const TurningChanges<S> more = by(dl, b1, b2);
-    turn(b1, b2, more);
-    changes.dt = changes.dt + dt;
-    changes.slides = (right & slides) | (changes.slides & !right);
-    turned.dl = turned.dl + dl;
-    turned.ds1 = turned.ds1 + more.ds1;
-    turned.ds2 = turned.ds2 + more.ds2;
-    // What both did to the slip and to the turn.
-    changes.du = choose(right, m.slip * changes.dt + m.both * turned.dl.cross(row.n), changes.du);
-    turned.d_rho = choose(right, m.turn * turned.dl + m.both * row.n.cross(changes.dt), turned.d_rho);
+    const auto rest =
+        !right & (m.slip > zero) & ((row.jn > zero) | ((row.jt.sumAbs() + row.l.sumAbs()) > zero));
+    if (rest.any()) {
+      RowLanes<S> alone = row;
+      const auto slides = right & changes.slides;
+      rubRight(alone, b1, b2, slip, sliding, changes);
+      changes.slides = slides | (rest & changes.slides);
+      const V stops = l - per_C * (rho_t + m.both * row.n.cross(changes.dt));
+      dt = choose(rest, changes.dt, dt);
+      dl = choose(rest, choose(m.turn > zero, cut(stops, mostTurn, mostTurn), V::zero()) - l, dl);
+    }
+
+    const P mostSpin = spinning * load;
+    const P spun = largerOf(-mostSpin, smallerOf(l_n - per_C * rho_n, mostSpin));
+    TurningChanges<S> turned = by(dl + (spun - l_n) * row.n, b1, b2);
     turned.right = right;
+    turned.d_rho = turned.d_rho + m.both * row.n.cross(dt);
+    changes.dt = dt;
+    changes.du = m.slip * dt + m.both * dl.cross(row.n);
+    row.jt = row.jt + dt;
+    row.l = row.l + turned.dl;
+    return turned;
   }
 };
 
