@@ -143,7 +143,7 @@ struct SlippingAndTurning {
 
 }  // namespace
 
-// Seen to fail: the sign of X turned; the impulse cut by the other's limit; D by A C alone.
+// Seen to fail: the sign of X turned; the turn cut by the limit of friction; D = A C.
 TEMPLATE_TEST_CASE("Friction and resistance that stop slip and turn together are those of many turns", "",
                    GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
@@ -179,8 +179,8 @@ TEMPLATE_TEST_CASE("Friction and resistance that stop slip and turn together are
   }
 }
 
-// Seen to fail: impulses that rows have already left out; the static limit for the kinetic one; bodies pushed
-// by what was wanted.
+// Seen to fail: impulses that rows have already left out; the static limit for the kinetic one; a change of
+// the slip by friction alone; where each acts by itself, the turn before friction.
 TEMPLATE_TEST_CASE("rows side by side stop slip and turn as each does by itself", "",
                    GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
