@@ -116,35 +116,34 @@ TEST_CASE("A blow that both friction and resistance could stop leaves neither sl
   }
 }
 
-// Seen to fail: a slip that is flung back while the turn is stopped, as if nothing coupled them.
+// Seen to fail: a slip that is flung back while the turn is stopped, as if nothing coupled them; the turn
+// reckoned with friction that knows no limit.
 TEST_CASE("A blow of bodies that touch already is the one of bodies that meet in the step") {
   const CounterRandom random(12);
   std::uint64_t counter = 0;
   const auto any = [&] { return random.uniform(counter++, -1, 1); };
-  for (std::size_t blow = 0; blow < 60; ++blow) {
+  for (std::size_t blow = 0; blow < 480; ++blow) {
     SimulationConfig<double> config = plain(0.01);
     config.coeffRestitution = 0.8;
-    config.coeffFriction = config.coeffStaticFriction = 100;
+    config.coeffFriction = std::array{0.1, 0.3, 100.0}[blow / 40 % 3];
+    config.coeffStaticFriction = std::array{1.0, 1.5}[blow / 120 % 2] * config.coeffFriction;
     config.rollingFriction = std::array{0.0, 0.01, 0.1, 100.0}[blow % 4];
     config.tangentialRestitution = std::array{0.0, 0.5, 1.0}[blow % 3];
     const Vec v(any(), any(), -1);
     const Vec w(any(), any(), any());
-    std::vector<double> ends[2];
-    for (const bool meets : {false, true}) {
+    const auto end = [&](bool meets) {
       Space<double> space(config);
       space.addPlane({0, 0, 1}, 0);
       space.addBody(ball({0, 0, meets ? 0.505 : 0.5 - 1e-12}, v, 0.5, 2.0, w));
       space.computeDynamics(0);
       REQUIRE(space.impacts().size() == (meets ? 1 : 0));
-      for (int c = 0; c < 3; ++c) {
-        ends[meets].push_back(space.body(0).velocity()[c]);
-        ends[meets].push_back(space.body(0).angularVelocity()[c]);
-      }
-    }
-    for (std::size_t i = 0; i < ends[0].size(); ++i) {
-      CAPTURE(blow, i);
-      CHECK_THAT(ends[0][i], WithinAbs(ends[1][i], 1e-14));
-    }
+      return std::pair(Vec(space.body(0).velocity()), Vec(space.body(0).angularVelocity()));
+    };
+    const auto [v1, w1] = end(false);
+    const auto [v2, w2] = end(true);
+    CAPTURE(blow, v1, v2, w1, w2);
+    CHECK((v1 - v2).norm() < 1e-13);
+    CHECK((w1 - w2).norm() < 1e-13);
   }
 }
 

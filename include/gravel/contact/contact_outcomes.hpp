@@ -6,9 +6,11 @@
 #include <gravel/contact/collision_outcome.hpp>
 #include <gravel/contact/contact_bodies.hpp>
 #include <gravel/contact/contact_list.hpp>
+#include <gravel/contact/earlier_impulses.hpp>
 
 #include <algorithm>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -23,13 +25,17 @@ struct ContactOutcomes {
   Scalar driftWork = Scalar(0);  ///< [J] put in by the shear of the domain, as in ContactReport
 };
 
-/// Asks `hook` about each contact of two bodies that approach faster than what rests picks up in a step,
-/// `threshold` + 2 |a_rel.n| h, and gives them the velocities of its outcome. O(contacts x decided), one
-/// thread.
+/// Asks `hook` about each contact of two bodies that approach faster than what rests picks up in a step, and
+/// gives them the velocities of its outcome. That is `threshold` + 2 |a_rel.n| h, and no less than
+/// `threshold` + (|a_1| + |a_2|) h where both lean on others or stand: in a heap at rest relative
+/// accelerations vanish, and what a step brings is passed on by the others.
+/// O(contacts x (decided + log(borne))), one thread.
+/// \param borne of contacts in the last solve, sorted by keys
 /// \param decided pairs of ids about which it was asked in this step already
 template <Real S, ContactBodies B>
 ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, const CollisionHook<S>& hook,
                                   const S& time, const S& threshold, const S& h,
+                                  std::span<const StoredImpulse<S>> borne,
                                   const std::vector<std::pair<std::uint64_t, std::uint64_t>>& decided = {}) {
   ContactOutcomes<S> outcomes;
   const auto partner = [&](std::uint32_t i, std::uint64_t id) {
@@ -45,6 +51,19 @@ ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, con
     return detail::isMovable(bodies, i) ? Vector3<S>(bodies.accelerations()[i])
                                         : Vector3<S>(Vector3<S>::Zero());
   };
+  std::vector<bool> leans(bodies.size());
+  for (const Contact<S>& c : contacts) {
+    const bool bears = std::binary_search(borne.begin(), borne.end(), c, [](const auto& a, const auto& b) {
+      return ContactKeys{a.key1, a.key2} < ContactKeys{b.key1, b.key2};
+    });
+    if (bears) {
+      leans[c.first] = true;
+      if (c.second != staticPartner) {
+        leans[c.second] = true;
+      }
+    }
+  }
+  const auto stands = [&](std::uint32_t i) { return leans[i] || !detail::isMovable(bodies, i); };
   for (const Contact<S>& c : contacts) {
     if (c.second == staticPartner ||
         std::find(decided.begin(), decided.end(), std::pair(c.key1, c.key2)) != decided.end()) {
@@ -53,8 +72,15 @@ ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, con
     const Vector3<S> v_rel =
         detail::velocityOf(bodies, c.second) + contacts.drift(c) - detail::velocityOf(bodies, c.first);
     const S approach = -c.normal.dot(v_rel);
-    const S a_n = c.normal.dot(Vector3<S>(fall(c.second) - fall(c.first)));
-    if (!(approach > threshold + S(2) * (a_n < S(0) ? S(-a_n) : a_n) * h)) {
+    const Vector3<S> a1 = fall(c.first);
+    const Vector3<S> a2 = fall(c.second);
+    const S a_n = detail::sizeOf<S>(c.normal.dot(Vector3<S>(a2 - a1)));
+    const S falls = detail::safeNorm(a1) + detail::safeNorm(a2);
+    const S noise = S(16) * Eigen::NumTraits<S>::epsilon() *
+                    (detail::maxAbs(detail::velocityOf(bodies, c.first)) +
+                     detail::maxAbs(detail::velocityOf(bodies, c.second)) + falls * h);
+    const S rest = stands(c.first) && stands(c.second) ? std::max<S>(falls, S(2) * a_n) : S(2) * a_n;
+    if (!(approach > threshold + noise + rest * h)) {
       continue;
     }
     const Collision<S> hit{

@@ -111,9 +111,10 @@ void ContactProblem<S>::aimSlip(const Taking<B>& taking, const Group& group, std
       const S mobility = detail::normalMobility(m1, m2);
       const auto m =
           detail::SlipAndTurn<S>::of(mobility, row.c1, resists.q1, m1.spin, row.c2, resists.q2, m2.spin);
-      const Vector3<S> j = (-(S(1) + restored) * detail::reciprocal<S>(m.slip)) * slip;
-      const Vector3<S> rho = resists.q2 * b2.s - resists.q1 * b1.s + m.both * row.n.cross(j);
       const S jn = detail::reciprocal<S>(mobility) * (rowLanes.target[lane] - v_n);
+      const Vector3<S> j = tangentialImpulse<S>(detail::reciprocal<S>(m.slip), slip, jn, rowLanes.stick[lane],
+                                                rowLanes.slide[lane], restored);
+      const Vector3<S> rho = resists.q2 * b2.s - resists.q1 * b1.s + m.both * row.n.cross(j);
       slipTarget += m.both * resistTurning<S>(Vector3<S>(-detail::reciprocal<S>(m.turn) * rho), row.n, jn,
                                               resists.rolling, resists.spinning)
                                  .cross(row.n);

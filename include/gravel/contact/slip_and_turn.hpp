@@ -83,7 +83,7 @@ SlipAndTurnImpulses<Scalar> stopSlipAndTurn(const detail::SlipAndTurn<Scalar>& m
   }
   for (int turn = 0; turn < 200; ++turn) {
     l = within(turns(j));
-    const V next = clampToCone<Scalar>(rubs(l), jn, mu_s, mu_k);
+    const V next = clampToCone<Scalar>(rubs(l), jn, mu_k, mu_k);
     const bool stays = detail::maxAbs(V(next - j)) <= Eigen::NumTraits<Scalar>::epsilon() * mu_s * jn;
     j = next;
     if (stays) {

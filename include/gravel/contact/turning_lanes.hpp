@@ -137,8 +137,8 @@ struct TurningLanes {
     }
     dt = choose(right, dt, V::zero());
     dl = choose(right, dl, V::zero());
-    const auto rest =
-        !right & (m.slip > zero) & ((row.jn > zero) | ((row.jt.sumAbs() + row.l.sumAbs()) > zero));
+    const auto presses = (row.jn > zero) | ((row.jt.sumAbs() + row.l.sumAbs()) > zero);
+    const auto rest = presses & (m.slip > zero) & !right;
     if (rest.any()) {
       RowLanes<S> alone = row;
       const auto slides = right & changes.slides;

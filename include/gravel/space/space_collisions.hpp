@@ -29,9 +29,9 @@ auto Space<Scalar, Layout>::decideCollisions(const Scalar& time) -> std::vector<
     }
   }
   const SimulationConfig<Scalar>& c = this->config_;
-  const ContactOutcomes<Scalar> ends =
-      decideContacts<Scalar>(contacts(), bodies_, contact_.collisionHook, time,
-                             std::max(c.restitutionThreshold, c.epsilon), contact_dt_, decided);
+  const ContactOutcomes<Scalar> ends = decideContacts<Scalar>(
+      contacts(), bodies_, contact_.collisionHook, time, std::max(c.restitutionThreshold, c.epsilon),
+      contact_dt_, contact_.memory(), decided);
   for (const auto& [id1, id2] : ends.merges) {
     merges.emplace_back(BodyId{id1}, BodyId{id2});
   }
@@ -50,7 +50,7 @@ auto Space<Scalar, Layout>::decideTouching() -> std::vector<std::pair<BodyId, Bo
   }
   const ContactOutcomes<Scalar> starts = decideContacts<Scalar>(
       contacts(), bodies_, contact_.collisionHook, time_,
-      std::max<Scalar>(this->config_.restitutionThreshold, this->config_.epsilon), dt_);
+      std::max<Scalar>(this->config_.restitutionThreshold, this->config_.epsilon), dt_, contact_.memory());
   left_.restitution += starts.restitutionLoss;
   left_.friction += starts.frictionLoss;
   left_.work -= starts.driftWork;
