@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 using namespace gravel;
@@ -121,9 +122,9 @@ struct SlippingAndTurning {
     return detail::SlipAndTurn<S>::of(one.inverseMass + two.inverseMass, row.c1, turning.q1, one.spin, row.c2,
                                       turning.q2, two.spin);
   }
-  SlipAndTurnImpulses<S> stopped() const {
-    return stopSlipAndTurn<S>(mobility(), slip(), rho(), row.n, jn, row.stick, row.slide, turning.rolling,
-                              turning.spinning);
+  GripImpulses<S> stopped() const {
+    return gripImpulses<S>(mobility(), slip(), rho(), row.n, jn,
+                           {row.stick, row.slide, turning.rolling, turning.spinning}, S(0));
   }
   /// Bodies after these.
   SlippingAndTurning after(const V& j, const V& l) const {
@@ -215,6 +216,11 @@ TEMPLATE_TEST_CASE("Friction and resistance that stop slip and turn obey the law
               std::abs(impulse.dot(left) + along) <= S(1e-6) * along + little * kept * contact.jn);
     };
     CHECK(obeys(j, slip, contact.row.stick, contact.row.slide));
+    if (slip.norm() > little) {  // as more than the static limit would stop it
+      SlippingAndTurning<S> rough = std::as_const(contact);
+      rough.row.stick = S(1e6);
+      CHECK(rough.stopped().tangential.norm() > contact.row.stick * contact.jn * (1 - S(1e-5)));
+    }
     CHECK(obeys(l, rho, contact.turning.rolling, contact.turning.rolling));
     seen[(slip.norm() <= little ? 0U : 1U) + (rho.norm() <= little ? 0U : 2U)] += 1;
   }

@@ -521,4 +521,38 @@ TEST_CASE("What rests in a heap, or in a field that turns, is nobody's decision"
     advance(space, 240);
     CHECK(space.n() == 2);
   }
+  SECTION("but one that rolls along the floor against another that it touches is") {
+    config.timeStep = 1.0 / 60;  // of which g h = 0.16 m/s
+    Space<double> space(config);
+    space.setUniformField({0, 0, -g});
+    space.addPlane({0, 0, 1}, 0);
+    space.addBody(ball({0, 0, 0.5}, {0, 0, 0}, 0.5));
+    space.addBody(ball({1, 0, 0.5}, {0, 0, 0}, 0.5));
+    advance(space, 30);
+    space.setCollisionHook(mergeAll);
+    advance(space, 30);
+    REQUIRE(space.n() == 2);
+    space.body(0).position()[0] += 1e-9;  // contacts are found anew
+    space.body(0).velocity() = Vec(0.1, 0, 0);
+    space.computeDynamics(0);
+    CHECK(space.n() == 1);
+  }
+  SECTION("and so is one in a pyramid that is driven into another") {
+    config.timeStep = 1.0 / 240;
+    Space<double> space(config);
+    space.setUniformField({0, 0, -g});
+    space.addPlane({0, 0, 1}, 0);
+    for (const double angle : {0.0, 2.1, 4.2}) {
+      space.addBody(ball({0.58 * std::cos(angle), 0.58 * std::sin(angle), 0.5}, {0, 0, 0}, 0.5));
+    }
+    space.addBody(ball({0, 0, 0.5 + std::sqrt(2.0 / 3)}, {0, 0, 0}, 0.5));
+    advance(space, 240);
+    space.setCollisionHook(mergeAll);
+    advance(space, 30);
+    REQUIRE(space.n() == 4);
+    space.body(3).position()[2] -= 1e-9;
+    space.body(3).velocity() = Vec(0, 0, -0.5);
+    space.computeDynamics(0);
+    CHECK(space.n() < 4);
+  }
 }

@@ -26,12 +26,12 @@ struct ContactOutcomes {
 };
 
 /// Asks `hook` about each contact of two bodies that approach faster than what rests picks up in a step, and
-/// gives them the velocities of its outcome. That is `threshold` + 2 |a_rel.n| h, and no less than
-/// `threshold` + (|a_1| + |a_2|) h where both lean on others or stand: in a heap at rest relative
-/// accelerations vanish, and what a step brings is passed on by the others.
-/// O(contacts x (decided + log(borne))), one thread.
-/// \param borne of contacts in the last solve, sorted by keys
-/// \param decided pairs of ids about which it was asked in this step already
+/// gives them the velocities of its outcome. What rests approaches by no more than `threshold` + 2 |a_rel.n|
+/// h and rounding. Where both lean on others or stand, also by what a step's fall brings along n, of each no
+/// more than |a| h and than others hold it with along n, the root of the sum of the squares of (n.J): in a
+/// heap relative accelerations vanish, while along a table nothing holds. O(bodies + contacts x decided), one
+/// thread. \param borne of contacts in the last solve, sorted by keys, as contacts are \param decided pairs
+/// of ids about which it was asked in this step already
 template <Real S, ContactBodies B>
 ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, const CollisionHook<S>& hook,
                                   const S& time, const S& threshold, const S& h,
@@ -51,19 +51,32 @@ ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, con
     return detail::isMovable(bodies, i) ? Vector3<S>(bodies.accelerations()[i])
                                         : Vector3<S>(Vector3<S>::Zero());
   };
-  std::vector<bool> leans(bodies.size());
+  using Squares = Eigen::Matrix<S, 3, 3>;
+  std::vector<Squares> loads(bodies.size(), Squares::Zero());  // J J^T of each body's contacts
+  auto known = borne.begin();
   for (const Contact<S>& c : contacts) {
-    const bool bears = std::binary_search(borne.begin(), borne.end(), c, [](const auto& a, const auto& b) {
-      return ContactKeys{a.key1, a.key2} < ContactKeys{b.key1, b.key2};
-    });
-    if (bears) {
-      leans[c.first] = true;
+    const ContactKeys keys = ContactName::of(c).keys;
+    while (known != borne.end() && known->keys() < keys) {
+      ++known;
+    }
+    if (known != borne.end() && known->keys() == keys) {
+      const Vector3<S> j = known->impulse.normal * c.normal + known->impulse.tangential;
+      loads[c.first] += j * j.transpose();
       if (c.second != staticPartner) {
-        leans[c.second] = true;
+        loads[c.second] += j * j.transpose();
       }
     }
   }
-  const auto stands = [&](std::uint32_t i) { return leans[i] || !detail::isMovable(bodies, i); };
+  const auto stands = [&](std::uint32_t i) {
+    return !detail::isMovable(bodies, i) || loads[i].trace() > S(0);
+  };
+  // A solve takes off what half a step brings.
+  const auto held = [&](std::uint32_t i, const Vector3<S>& n) {
+    using std::sqrt;
+    const S load_sq = n.dot(Vector3<S>(loads[i] * n));
+    const S most = load_sq > S(0) ? S(S(2) * sqrt(load_sq) / S(bodies.masses()[i])) : S(0);
+    return detail::isMovable(bodies, i) ? std::min<S>(most, detail::safeNorm(fall(i)) * h) : S(0);
+  };
   for (const Contact<S>& c : contacts) {
     if (c.second == staticPartner ||
         std::find(decided.begin(), decided.end(), std::pair(c.key1, c.key2)) != decided.end()) {
@@ -74,13 +87,15 @@ ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, con
     const S approach = -c.normal.dot(v_rel);
     const Vector3<S> a1 = fall(c.first);
     const Vector3<S> a2 = fall(c.second);
-    const S a_n = detail::sizeOf<S>(c.normal.dot(Vector3<S>(a2 - a1)));
-    const S falls = detail::safeNorm(a1) + detail::safeNorm(a2);
-    const S noise = S(16) * Eigen::NumTraits<S>::epsilon() *
-                    (detail::maxAbs(detail::velocityOf(bodies, c.first)) +
-                     detail::maxAbs(detail::velocityOf(bodies, c.second)) + falls * h);
-    const S rest = stands(c.first) && stands(c.second) ? std::max<S>(falls, S(2) * a_n) : S(2) * a_n;
-    if (!(approach > threshold + noise + rest * h)) {
+    const S relative = S(2) * h * detail::sizeOf<S>(c.normal.dot(Vector3<S>(a2 - a1)));
+    const S sizes = detail::maxAbs(detail::velocityOf(bodies, c.first)) +
+                    detail::maxAbs(detail::velocityOf(bodies, c.second)) +
+                    h * (detail::maxAbs(a1) + detail::maxAbs(a2));
+    const S noise = S(16) * Eigen::NumTraits<S>::epsilon() * sizes;
+    const S rest = stands(c.first) && stands(c.second)
+                       ? std::max<S>(relative, held(c.first, c.normal) + held(c.second, c.normal))
+                       : relative;
+    if (!(approach > threshold + noise + rest)) {
       continue;
     }
     const Collision<S> hit{

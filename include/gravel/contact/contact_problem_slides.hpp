@@ -1,7 +1,7 @@
 #pragma once
 
 /// \file
-/// Members of `ContactProblem` that know which rows slide, and what slip is to vanish.
+/// Members of `ContactProblem` that make rows right, know which of them slide, and what slip is to vanish.
 ///
 /// Where a contact has more friction at rest than in a slide, Coulomb's law leaves several solutions open:
 /// one that slides loads its neighbours, which then may slide, too. Sought is the one in which a contact
@@ -104,20 +104,17 @@ void ContactProblem<S>::aimSlip(const Taking<B>& taking, const Group& group, std
     const S v_n = row.n.dot(v_rel);
     const Vector3<S> slip = Vector3<S>(detail::slipVelocity(row, v_rel, v_n, b1, b2)) - slipTarget;
     slipTarget -= restored * slip;
-    if (!turning.empty()) {  // as in a blow by itself resistance acts afterwards, and lets it slip
+    if (!turning.empty()) {  // and by what the resistance of a blow by itself will make it slip
       const Body& m1 = bodies[group.slot1[lane]];
       const Body& m2 = bodies[group.slot2[lane]];
       const detail::TurningRow<S>& resists = turning[k];
-      const S mobility = detail::normalMobility(m1, m2);
-      const auto m =
-          detail::SlipAndTurn<S>::of(mobility, row.c1, resists.q1, m1.spin, row.c2, resists.q2, m2.spin);
-      const S jn = detail::reciprocal<S>(mobility) * (rowLanes.target[lane] - v_n);
-      const Vector3<S> j = tangentialImpulse<S>(detail::reciprocal<S>(m.slip), slip, jn, rowLanes.stick[lane],
-                                                rowLanes.slide[lane], restored);
-      const Vector3<S> rho = resists.q2 * b2.s - resists.q1 * b1.s + m.both * row.n.cross(j);
-      slipTarget += m.both * resistTurning<S>(Vector3<S>(-detail::reciprocal<S>(m.turn) * rho), row.n, jn,
-                                              resists.rolling, resists.spinning)
-                                 .cross(row.n);
+      const S share = detail::reciprocal<S>(detail::normalMobility(m1, m2));
+      const auto m = detail::SlipAndTurn<S>::of(S(1), row.c1, resists.q1, S(share * m1.spin), row.c2,
+                                                resists.q2, S(share * m2.spin));
+      const auto [j, l] = gripImpulses<S>(
+          m, slip, Vector3<S>(resists.q2 * b2.s - resists.q1 * b1.s), row.n, S(rowLanes.target[lane] - v_n),
+          {rowLanes.stick[lane], rowLanes.slide[lane], resists.rolling, resists.spinning}, restored);
+      slipTarget += m.both * l.cross(row.n);
     }
   }
 }

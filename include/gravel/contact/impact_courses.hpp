@@ -88,44 +88,27 @@ class ImpactCourses : protected ImpactForecast<S> {
   };
 
   /// \param slip [m s^-1] across n \param dv_n [m s^-1] of the blow, along the normal
-  /// \param restitution  of the slip. Friction that flings it back acts first, and resistance on what turn
-  /// that
-  ///   leaves: stopped together, a turn could give a slip more energy than it lost.
+  /// \param restitution  of the slip
   static Grip gripOf(const ImpactMeeting<S>& at, bool boundary, const MassShares<S>& share,
                      const Vector3<S>& slip, const S& dv_n, const S& restitution) {
     const auto& [one, two, n, distance, a_n, drift, lead, material] = at;
     Grip grip;
-    const S spin1 = share.first * one.spin;
-    const S spin2 = share.second * two.spin;
-    const bool turns = material.rollingFriction > S(0) || material.spinningFriction > S(0);
-    if (turns) {
+    if (material.rollingFriction > S(0) || material.spinningFriction > S(0)) {
       grip.q1 = boundary ? S(1) : S(two.r / (one.r + two.r));
       grip.q2 = boundary ? S(0) : S(one.r / (one.r + two.r));
     }
-    const auto m = SlipAndTurn<S>::of(S(1), one.c, grip.q1, spin1, two.c, grip.q2, spin2);
-    const bool rubs = material.staticFriction > S(0) && dv_n > S(0);
-    const bool resists = m.turn > S(0);
+    const auto m = SlipAndTurn<S>::of(S(1), one.c, grip.q1, S(share.first * one.spin), two.c, grip.q2,
+                                      S(share.second * two.spin));
     const Vector3<S> rho = grip.q2 * two.s - grip.q1 * one.s;
-    const auto rhoAfter = [&] { return Vector3<S>(rho + m.both * at.n.cross(grip.dv_t)); };
-    if (rubs && resists && !(restitution > S(0))) {
-      const auto both =
-          stopSlipAndTurn<S>(m, slip, rho, n, dv_n, material.staticFriction, material.kineticFriction,
-                             material.rollingFriction, material.spinningFriction);
-      grip.dv_t = both.tangential;
-      grip.l = both.turning;
-    } else {
-      if (rubs) {
-        grip.dv_t = tangentialImpulse<S>(S(1) / m.slip, slip, dv_n, material.staticFriction,
-                                         material.kineticFriction, restitution);
-      }
-      if (resists) {
-        grip.l = resistTurning<S>(Vector3<S>(rhoAfter() / -m.turn), n, dv_n, material.rollingFriction,
-                                  material.spinningFriction);
-      }
-    }
-    const Vector3<S> supported = two.supported - one.supported;
-    grip.work = grip.dv_t.dot(Vector3<S>(slip + (m.slip / S(2)) * grip.dv_t - supported)) +
-                grip.l.dot(Vector3<S>(rhoAfter() + (m.turn / S(2)) * grip.l));
+    const auto [j, l] = gripImpulses<S>(m, slip, rho, n, dv_n,
+                                        {material.staticFriction, material.kineticFriction,
+                                         material.rollingFriction, material.spinningFriction},
+                                        restitution);
+    grip.dv_t = j;
+    grip.l = l;
+    const Vector3<S> rhoRubbed = rho + m.both * n.cross(j);
+    grip.work = j.dot(Vector3<S>(slip + (m.slip / S(2)) * j - (two.supported - one.supported))) +
+                l.dot(Vector3<S>(rhoRubbed + (m.turn / S(2)) * l));
     return grip;
   }
 

@@ -2,7 +2,7 @@
 
 /// \file
 /// Resistance to rolling and spinning of rows in lanes: the units and the law are those of resistTurning(),
-/// beside friction those of stopSlipAndTurn().
+/// beside friction those of gripImpulses().
 
 #include <gravel/contact/row_lanes.hpp>
 #include <gravel/contact/slip_and_turn.hpp>
@@ -35,7 +35,7 @@ struct TurningChanges {
   V d_rho = V::zero();
   V ds1 = V::zero();
   V ds2 = V::zero();
-  typename Packed<S>::Truth right = {};  ///< beside friction, which is so too
+  typename Packed<S>::Truth right = {};  ///< with friction; else both are to be taken again
 };
 
 template <Real S>
@@ -106,10 +106,14 @@ struct TurningLanes {
                                                                const RowSlides<S>& sliding,
                                                                RowChanges<S>& changes) const {
     const P zero = P::zero();
-    const auto m = SlipAndTurn<P>::of(normalMobility(b1, b2), row.c1, q1, b1.spin, row.c2, q2, b2.spin);
+    const P normal = normalMobility(b1, b2);
+    const P mass = reciprocalOf(normal);
+    const auto m = SlipAndTurn<P>::of(choose(normal > zero, P::all(S(1)), zero), row.c1, q1, mass * b1.spin,
+                                      row.c2, q2, mass * b2.spin);
     const P per_C = reciprocalOf(m.turn);
     const P per_D = reciprocalOf(m.det);
-    const V rho_all = rho(b1, b2);
+    const V u = mass * slip;
+    const V rho_all = mass * rho(b1, b2);
     const P rho_n = row.n.dot(rho_all);
     const P l_n = row.n.dot(row.l);
     const V rho_t = rho_all - rho_n * row.n;
@@ -122,13 +126,13 @@ struct TurningLanes {
     const auto both = changes.rubs & (m.turn > zero);
 
     // Friction is free.
-    V dl = cut(l + per_D * (m.both * row.n.cross(slip) - m.slip * rho_t), mostTurn, mostTurn) - l;
-    V dt = -reciprocalOf(m.slip) * (slip + m.both * dl.cross(row.n));
+    V dl = cut(l + per_D * (m.both * row.n.cross(u) - m.slip * rho_t), mostTurn, mostTurn) - l;
+    V dt = -reciprocalOf(m.slip) * (u + m.both * dl.cross(row.n));
     changes.slides = both & ((row.jt + dt).squaredNorm() > most * most);
     auto right = both & !changes.slides;
     if (changes.slides.any()) {  // resistance is
       const P limit = choose(sliding.kinetic, row.slide, row.stick) * rubbed;
-      const V stops = row.jt + per_D * (m.both * rho_t.cross(row.n) - m.turn * slip);
+      const V stops = row.jt + per_D * (m.both * rho_t.cross(row.n) - m.turn * u);
       const V dt_slides = cut(stops, most, limit) - row.jt;
       const V dl_slides = -per_C * (rho_t + m.both * row.n.cross(dt_slides));
       right = both & !(changes.slides & ((l + dl_slides).squaredNorm() > mostTurn * mostTurn));
@@ -150,12 +154,13 @@ struct TurningLanes {
     }
 
     const P mostSpin = spinning * load;
-    const P spun = largerOf(-mostSpin, smallerOf(l_n - per_C * rho_n, mostSpin));
+    const P spins = largerOf(-mostSpin, smallerOf(l_n - per_C * rho_n, mostSpin));
+    const P spun = choose(m.turn > zero, spins, zero);
     TurningChanges<S> turned = by(dl + (spun - l_n) * row.n, b1, b2);
     turned.right = right;
-    turned.d_rho = turned.d_rho + m.both * row.n.cross(dt);
+    turned.d_rho = turned.d_rho + (normal * m.both) * row.n.cross(dt);
     changes.dt = dt;
-    changes.du = m.slip * dt + m.both * dl.cross(row.n);
+    changes.du = normal * (m.slip * dt + m.both * dl.cross(row.n));
     row.jt = row.jt + dt;
     row.l = row.l + turned.dl;
     return turned;
