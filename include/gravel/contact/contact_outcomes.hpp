@@ -26,12 +26,13 @@ struct ContactOutcomes {
 };
 
 /// Asks `hook` about each contact of two bodies that approach faster than what rests picks up in a step, and
-/// gives them the velocities of its outcome. What rests approaches by no more than `threshold` + 2 |a_rel.n|
-/// h and rounding. Where both lean on others or stand, also by what a step's fall brings along n, of each no
-/// more than |a| h and than others hold it with along n, the root of the sum of the squares of (n.J): in a
-/// heap relative accelerations vanish, while along a table nothing holds. O(bodies + contacts x decided), one
-/// thread. \param borne of contacts in the last solve, sorted by keys, as contacts are \param decided pairs
-/// of ids about which it was asked in this step already
+/// gives them the velocities of its outcome. What rests approaches by no more than `threshold`, rounding and
+/// 2 |a_rel.n| h. Where both lean on others or stand, also by what a step's fall brings along n: of each no
+/// more than |a| h, and than others hold it with along n, the root of the sum of the squares of (n.J). For in
+/// a heap relative accelerations vanish, while nothing holds along a table.
+/// O(bodies + contacts x decided), one thread.
+/// \param borne of contacts in the last solve, sorted by keys, as contacts are
+/// \param decided pairs of ids about which it was asked in this step already
 template <Real S, ContactBodies B>
 ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, const CollisionHook<S>& hook,
                                   const S& time, const S& threshold, const S& h,

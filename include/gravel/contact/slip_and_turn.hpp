@@ -16,7 +16,9 @@
 /// in which nothing cancels. Of j and l, within a circle each, the law wants the least energy (maximum
 /// dissipation). If one of the two is free, the other feels the mobility D/C or D/A, the same in all
 /// directions: it is the above, cut to its circle. So three closed forms serve all but contacts with both at
-/// their limits; for these the two are taken by turns, of which each lowers the energy.
+/// their limits. These are right where friction, cut beside the resistance of the first of them, leaves that
+/// resistance as it is, as on straight ways; else the two are taken by turns, of which each lowers the
+/// energy.
 
 #include <gravel/contact/impulses.hpp>
 
@@ -65,9 +67,11 @@ struct GripImpulses {
 /// couples the two. Friction that flings the slip back acts first, and resistance on the turn that it leaves:
 /// to ask for a slip and for no turn at once could give the slip more energy than both lost. (So as the
 /// restitution goes to 0, the blow does not go to the one without.) Else energy never grows; where both come
-/// to their limits, by the last of 200 turns at most. \param mobility in units in which 1/m1 + 1/m2 is of the
-/// order of 1 \param slip [m s^-1] across n \param rho [m s^-1] of the relative turn \param restitution of
-/// the slip
+/// to their limits at an angle, by the last of 200 turns at most.
+/// \param mobility  in units in which 1/m1 + 1/m2 is of the order of 1
+/// \param slip [m s^-1] across n
+/// \param rho [m s^-1] of the relative turn
+/// \param restitution  of the slip
 template <Real Scalar>
 GripImpulses<Scalar> gripImpulses(const detail::SlipAndTurn<Scalar>& mobility, const Vector3<Scalar>& slip,
                                   const Vector3<Scalar>& rho, const Vector3<Scalar>& n, const Scalar& jn,
@@ -103,6 +107,7 @@ GripImpulses<Scalar> gripImpulses(const detail::SlipAndTurn<Scalar>& mobility, c
   if (detail::safeNorm(V(l - n.dot(l) * n)) <= limits.rolling * jn) {
     return {j, within(l)};
   }
+  j = clampToCone<Scalar>(sticking, jn, mu_k, mu_k);
   for (int turn = 0; turn < 200; ++turn) {
     const V next = clampToCone<Scalar>(rubs(within(turns(j))), jn, mu_k, mu_k);
     const bool stays = detail::maxAbs(V(next - j)) <= Eigen::NumTraits<Scalar>::epsilon() * mu_s * jn;

@@ -98,9 +98,11 @@ struct TurningLanes {
     return {dl, q2 * ds2 - q1 * ds1, ds1, ds2};
   }
 
-  /// Friction and resistance of `row` become right while all others stand: together, where at most one of
-  /// them is at its limit then. Else each does by itself, friction first, and they are to be taken again, by
-  /// turns. \param slip that is to vanish
+  /// Friction and resistance of `row` become right while all others stand: together, if they do not both come
+  /// to their limits at an angle. Else each does by itself, friction first, and they are to be taken again.
+  /// Masses by their common mobility 1/m1 + 1/m2, as products of two of them may leave the range of float.
+  /// \param slip that is to vanish
+  /// \param changes  gets what friction does
   [[gnu::always_inline]] inline TurningChanges<S> rubAndResist(RowLanes<S>& row, const BodyLanes<S>& b1,
                                                                const BodyLanes<S>& b2, const V& slip,
                                                                const RowSlides<S>& sliding,
@@ -130,14 +132,20 @@ struct TurningLanes {
     V dt = -reciprocalOf(m.slip) * (u + m.both * dl.cross(row.n));
     changes.slides = both & ((row.jt + dt).squaredNorm() > most * most);
     auto right = both & !changes.slides;
-    if (changes.slides.any()) {  // resistance is
+    if (changes.slides
+            .any()) {  // resistance is; or both are at their limits, and would come to the same again
       const P limit = choose(sliding.kinetic, row.slide, row.stick) * rubbed;
       const V stops = row.jt + per_D * (m.both * rho_t.cross(row.n) - m.turn * u);
       const V dt_slides = cut(stops, most, limit) - row.jt;
       const V dl_slides = -per_C * (rho_t + m.both * row.n.cross(dt_slides));
-      right = both & !(changes.slides & ((l + dl_slides).squaredNorm() > mostTurn * mostTurn));
-      dt = choose(changes.slides, dt_slides, dt);
-      dl = choose(changes.slides, dl_slides, dl);
+      const auto rolls = !((l + dl_slides).squaredNorm() > mostTurn * mostTurn);
+      const V dt_most = cut(row.jt + dt, limit, limit) - row.jt;
+      const V dl_most = cut(l - per_C * (rho_t + m.both * row.n.cross(dt_most)), mostTurn, mostTurn) - l;
+      const P little = P::all(S(8) * Eigen::NumTraits<S>::epsilon()) * mostTurn;
+      const auto same = !((dl_most - dl).squaredNorm() > little * little);
+      right = (changes.slides & (rolls | same)) | right;
+      dt = choose(changes.slides, choose(rolls, dt_slides, dt_most), dt);
+      dl = choose(changes.slides, choose(rolls, dl_slides, dl_most), dl);
     }
     dt = choose(right, dt, V::zero());
     dl = choose(right, dl, V::zero());
