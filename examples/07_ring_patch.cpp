@@ -3,8 +3,8 @@
 /// velocity dispersion, filling of the central plane, viscosity and the rate of collisions, beside published
 /// numbers.
 ///
-/// 07_ring_patch [bodies] [orbits]: settles for so many orbits and measures for as many. 2000 and 20 take a
-/// minute or two and give the numbers of docs/accuracy-and-speed.md, 500 and 20 about these.
+/// 07_ring_patch [bodies] [orbits]: settles for so many orbits and measures for as many. 2000 and 20 take
+/// about a minute and give the numbers of docs/accuracy-and-speed.md, 500 and 20 about these.
 
 #include "scenes/ring.hpp"
 

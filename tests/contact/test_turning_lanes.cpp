@@ -8,7 +8,6 @@
 
 #include <array>
 #include <cmath>
-#include <utility>
 #include <vector>
 
 using namespace gravel;
@@ -96,22 +95,29 @@ struct SlippingAndTurning {
   detail::SolverBody<S> one, two;
   S jn;
 
-  /// Coefficients of 1e-2 to 1e2, k of 1/50 to 1/2, masses and arms that differ.
+  /// Coefficients of 1e-2 to 1e2, k of 1/50 to 1/2, masses and arms that differ. \param one01 in [-1, 1)
   template <class One>
-  SlippingAndTurning(One&& one01) {
+  static SlippingAndTurning of(One&& one01) {
+    SlippingAndTurning contact;
     const auto any = [&] { return V(one01(), one01(), one01()); };
     const auto strength = [&] { return S(std::pow(S(10), 2 * one01())); };
     const auto body = [&] {
       const S inverseMass = std::pow(S(10), one01());
       return detail::SolverBody<S>{any(), inverseMass, any(), S(inverseMass * 10 * std::pow(S(5), one01()))};
     };
-    row = {any().normalized(), S(1) + one01() / 8, S(1) + one01() / 8, S(0), strength(), S(0)};
-    row.slide = row.stick * (S(0.75) + one01() / 4);
+    const S stick = strength();
+    contact.row = {any().normalized(),
+                   S(1) + one01() / 8,
+                   S(1) + one01() / 8,
+                   S(0),
+                   stick,
+                   stick * (S(0.75) + one01() / 4)};
     const S q = S(0.5) + one01() / 4;
-    turning = {q, S(1) - q, strength(), strength()};
-    one = body();
-    two = body();
-    jn = S(1) + one01() / 2;
+    contact.turning = {q, S(1) - q, strength(), strength()};
+    contact.one = body();
+    contact.two = body();
+    contact.jn = S(1) + one01() / 2;
+    return contact;
   }
   V slip() const {
     const V v = two.v - one.v;
@@ -153,7 +159,7 @@ TEMPLATE_TEST_CASE("Friction and resistance that stop slip and turn together are
   std::uint64_t counter = 0;
   std::array<int, 4> seen{};
   for (int round = 0; round < 1000; ++round) {
-    SlippingAndTurning<S> contact([&] { return S(random.uniform(counter++, -1, 1)); });
+    auto contact = SlippingAndTurning<S>::of([&] { return S(random.uniform(counter++, -1, 1)); });
     contact.row.slide = contact.row.stick;  // else several may be right
     const V& n = contact.row.n;
     const auto m = contact.mobility();
@@ -194,7 +200,7 @@ TEMPLATE_TEST_CASE("Friction and resistance that stop slip and turn obey the law
   std::array<int, 4> seen{};
   const auto one = [&] { return S(random.uniform(counter++, -1, 1)); };
   for (int round = 0; round < 20'000; ++round) {
-    SlippingAndTurning<S> contact(one);
+    auto contact = SlippingAndTurning<S>::of(one);
     // Coefficients of grains, where both limits often bind.
     contact.row.stick = S(0.5) + one() * S(0.4);
     contact.row.slide = contact.row.stick * S(2) / S(3);
@@ -217,7 +223,7 @@ TEMPLATE_TEST_CASE("Friction and resistance that stop slip and turn obey the law
     };
     CHECK(obeys(j, slip, contact.row.stick, contact.row.slide));
     if (slip.norm() > little) {  // as more than the static limit would stop it
-      SlippingAndTurning<S> rough = std::as_const(contact);
+      auto rough = contact;
       rough.row.stick = S(1e6);
       CHECK(rough.stopped().tangential.norm() > contact.row.stick * contact.jn * (1 - S(1e-5)));
     }
@@ -250,7 +256,7 @@ TEMPLATE_TEST_CASE("rows side by side stop slip and turn as each does by itself"
     std::vector<V> j, l;
     detail::RowGroup<S> group;
     for (std::size_t lane = 0; lane < width; ++lane) {
-      contacts.emplace_back(one);
+      contacts.push_back(SlippingAndTurning<S>::of(one));
       const auto& contact = contacts.back();
       rows.push_back(contact.row);
       turning.push_back(contact.turning);

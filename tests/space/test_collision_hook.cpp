@@ -453,8 +453,8 @@ TEST_CASE("Bodies that touch and part, or rest on each other, are nobody's decis
   CHECK(space.n() == 4);
 }
 
-// In a heap relative accelerations vanish. Seen to fail: no more than what these bring in a step is rest (the
-// pyramid was one body after a step, the heap nine after a second).
+// In a heap relative accelerations vanish. Seen to fail: no more than what these bring in a step is rest
+// (pyramid and heap were one body after a second); the whole fall, along a table as well.
 TEST_CASE("What rests in a heap, or in a field that turns, is nobody's decision") {
   const double g = 9.81;
   SimulationConfig<double> config = bouncy(1.0 / 240);

@@ -132,8 +132,8 @@ struct TurningLanes {
     V dt = -reciprocalOf(m.slip) * (u + m.both * dl.cross(row.n));
     changes.slides = both & ((row.jt + dt).squaredNorm() > most * most);
     auto right = both & !changes.slides;
-    if (changes.slides
-            .any()) {  // resistance is; or both are at their limits, and would come to the same again
+    if (changes.slides.any()) {
+      // Resistance is; or both are at their limits, and would come to the same again.
       const P limit = choose(sliding.kinetic, row.slide, row.stick) * rubbed;
       const V stops = row.jt + per_D * (m.both * rho_t.cross(row.n) - m.turn * u);
       const V dt_slides = cut(stops, most, limit) - row.jt;
