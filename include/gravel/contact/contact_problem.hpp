@@ -45,6 +45,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
   std::vector<detail::RowMark> marks;   ///< by row
   std::vector<Vector3<S>> slipTargets;  ///< slip after a blow that sticks, by row; empty if zero for all
   std::vector<detail::TurningRow<S>> turning;  ///< by row; empty if nothing resists rolling or spinning
+  std::vector<detail::RowBefore<S>> earlier;   ///< by row; empty if zero for all
   bool drifting = false;                       ///< any contact whose second side drifts
   bool grips = false;                          ///< any contact with more friction at rest than in a slide
   bool atOnce = false;       ///< rows slide as soon as friction is cut: there is no time to ask
@@ -121,12 +122,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
         });
     return row;
   }
-  [[gnu::always_inline]] inline void storeImpulses(const Group& group, const Lanes& row) {
-    impulses_->store(group, row);
-    for (std::size_t lane = 0; lane < group.count; ++lane) {
-      marks[group.row[lane]].taken = true;
-    }
-  }
+  [[gnu::always_inline]] inline void storeImpulses(const Group& group, const Lanes& row);
 
   /// The square of the change that a sweep would make in velocities, at most; no bound, where it is still to
   /// be asked who slides.
@@ -148,12 +144,10 @@ class ContactProblem : public detail::ProblemBodies<S> {
 
   /// The part of this slip that is to vanish.
   [[gnu::always_inline]] inline detail::PackedVector<S> slipOf(const Group& group,
-                                                               const detail::PackedVector<S>& slip) const {
-    return slipTargets.empty() ? slip : slip - vectorsOf(group, slipTargets);
-  }
-
+                                                               const detail::PackedVector<S>& slip) const;
   /// Where static and kinetic friction are one, it does not matter who slides.
   [[gnu::always_inline]] inline detail::RowSlides<S> slidesOf(const Group& group) const;
+  [[gnu::always_inline]] inline void lookBackAt(const Group& group, detail::RowSlides<S>& slides) const;
 
   /// Sweeps went on with static friction where it was not known who slides: those whose friction is at its
   /// limit, and whose slip exceeds `least`, do, and are to be looked at again. \return whether there are any
@@ -194,11 +188,10 @@ class ContactProblem : public detail::ProblemBodies<S> {
   template <class B, class Wanted>
   Most lookAtRows(const Taking<B>& taking, Wanted&& wanted);
 
-  /// By row, in the rows of a group.
-  static detail::PackedVector<S> vectorsOf(const Group& group, const std::vector<Vector3<S>>& all) {
-    const auto part = [&](Eigen::Index c) {
-      return Pack::of([&](std::size_t lane) { return all[group.row[lane]][c]; });
-    };
+  /// By lane.
+  template <class Of>
+  [[gnu::always_inline]] static inline detail::PackedVector<S> vectorsOf(Of&& of) {
+    const auto part = [&](Eigen::Index c) { return Pack::of([&](std::size_t lane) { return of(lane)[c]; }); };
     return {part(0), part(1), part(2)};
   }
 
@@ -267,6 +260,13 @@ class ContactProblem : public detail::ProblemBodies<S> {
   [[gnu::always_inline]] inline detail::TurningPair<S> turningOf(
       const Taking<B>& taking, const Group& group, const Lanes& row, const detail::BodyLanes<S>& b1,
       const detail::BodyLanes<S>& b2, const detail::PackedVector<S>& v, const Pack& v_n) const;
+
+  /// Takes down how rows slipped and turned before, of those that last.
+  /// \param b1,b2 as in aim() \param v_n without drifts \param aimed  slip that is left to the way ahead
+  template <class B>
+  void lookBack(const Taking<B>& taking, const Group& group, const Lanes& row, const detail::BodyLanes<S>& b1,
+                const detail::BodyLanes<S>& b2, const Pack& v_n, const Pack& load,
+                const detail::PackedVector<S>& aimed);
 
   /// Target of a row that may be faster than what rests.
   template <class B>

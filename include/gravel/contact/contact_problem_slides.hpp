@@ -16,17 +16,34 @@
 namespace gravel {
 
 template <Real S>
+inline void ContactProblem<S>::storeImpulses(const Group& group, const Lanes& row) {
+  impulses_->store(group, row);
+  for (std::size_t lane = 0; lane < group.count; ++lane) {
+    marks[group.row[lane]].taken = true;
+  }
+}
+
+template <Real S>
+inline auto ContactProblem<S>::slipOf(const Group& group, const detail::PackedVector<S>& slip) const
+    -> detail::PackedVector<S> {
+  return slipTargets.empty()
+             ? slip
+             : slip - vectorsOf([&](std::size_t lane) { return slipTargets[group.row[lane]]; });
+}
+
+template <Real S>
 inline detail::RowSlides<S> ContactProblem<S>::slidesOf(const Group& group) const {
   const Pack zero = Pack::zero();
-  if (!grips) {
-    return {zero > zero, zero > zero, Pack::all(this->mostLoad_)};
+  detail::RowSlides<S> slides{zero > zero, zero > zero, Pack::all(this->mostLoad_)};
+  lookBackAt(group, slides);
+  if (grips) {
+    const auto of = [&](auto&& is) {
+      return Pack::of([&](std::size_t lane) { return S(is(marks[group.row[lane]]) ? 1 : 0); }) > zero;
+    };
+    slides.kinetic = of([&](const detail::RowMark& m) { return m.kinetic || atOnce; });
+    slides.tired = of([](const detail::RowMark& m) { return m.slides >= detail::RowMark::patience; });
   }
-  const auto of = [&](auto&& is) {
-    return Pack::of([&](std::size_t lane) { return S(is(marks[group.row[lane]]) ? 1 : 0); }) > zero;
-  };
-  return {of([&](const detail::RowMark& m) { return m.kinetic || atOnce; }),
-          of([](const detail::RowMark& m) { return m.slides >= detail::RowMark::patience; }),
-          Pack::all(this->mostLoad_)};
+  return slides;
 }
 
 template <Real S>

@@ -36,6 +36,11 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   const bool slips =
       friction && (kinds.drift || kinds.spring || (way.follows && (this->turns_ || !way.bend.empty())));
   slipTargets.assign(slips ? rows.size() : 0, Vector3<S>::Zero());
+  // A slip is at most of four speeds and spins of three components.
+  const S fall = speedIn(S(this->leastFall_ * dt));
+  const bool lasts = drifting || S(7) * this->fastest_ > detail::RowBefore<S>::lasting() * fall;
+  const bool looksBack = friction && way.kick > S(0) && lasts;
+  earlier.assign(looksBack ? rows.size() : 0, {});
   detail::resizeSparingly(rests_, contacts.size());
   detail::resizeSparingly(approaches_, contacts.size());
   detail::resizeSparingly(wrongs_, again ? colouring.islandsEnd() : 0);
@@ -210,6 +215,9 @@ inline S ContactProblem<S>::aim(const Taking<B>& taking, const Group& group, Lan
   const bool slips = !slipTargets.empty() && (drifting || bends || fast.any() || turned.counts.any());
   for (std::size_t lane = 0; lane < group.count && slips; ++lane) {  // of the others they are zero
     aimSlip(taking, group, lane, row, drift[lane], slip.at(lane));
+  }
+  if (!earlier.empty()) {
+    lookBack(taking, group, row, b1, b2, present, load, slip);
   }
   const Pack approach = row.target - present;
   S most(0);

@@ -63,8 +63,8 @@ void limitSweeps(ContactSettings<S>& settings, std::size_t most, std::size_t con
                : sweepsOfLooks(contacts, looks);
 }
 
-/// Where bodies go after a solve. Contacts are right at the end of the way that follows, as pairs turn on it
-/// and frames bend it (contact/turning_pair.hpp); where none follows, now.
+/// Where bodies come from, and go after a solve. Contacts are right at the end of the way that follows, as
+/// pairs turn on it and frames bend it (contact/turning_pair.hpp); where none follows, now.
 template <Real Scalar>
 struct WayAhead {
   bool follows = false;  ///< for the dt of the solve
@@ -73,6 +73,9 @@ struct WayAhead {
   std::span<const Vector3<Scalar>> bend;
   /// [s^-1] The frame turns the part of each spin across z by -frame dt.
   Scalar frame = Scalar(0);
+  /// [s] For which accelerations acted on the velocities since bodies slid as before; where it is 0, nothing
+  /// is known of that, and friction is held against the slip that it leaves.
+  Scalar kick = Scalar(0);
 };
 
 /// What a solve did.

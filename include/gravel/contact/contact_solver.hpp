@@ -117,6 +117,7 @@ class ContactSolver {
         goesOn_ = true;
       }
       detail::giveBack(problem_.slipTargets);
+      detail::giveBack(problem_.earlier);
     }
     if (!goesOn_) {
       rowImpulses_.clear(contacts.size());

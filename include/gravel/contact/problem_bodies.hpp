@@ -88,6 +88,7 @@ class ProblemBodies {
     heaviest_ = scaled<S>(scales.heaviest, massExponent_);
     fastest_ = scaled<S>(scales.fastest, speedExponent_);
     mostFall_ = scales.mostFall;
+    leastFall_ = scales.leastFall;
     mostGuess_ = tooMuch * fastest_ * heaviest_;
     initial[n].v = initial[n].s = Vector3<S>::Zero();
     initial[n].fall = initial[n].radius = S(0);
@@ -275,6 +276,7 @@ class ProblemBodies {
   S heaviest_ = S(0);  ///< mass, scaled
   S fastest_ = S(0);   ///< speed, scaled
   S mostFall_ = S(0);  ///< [m s^-2]
+  S leastFall_ = S(0);
   /// Normal impulse that friction counts at most: 100 times what stops all at the largest approach and a
   /// fall.
   S mostLoad_ = S(0);

@@ -104,7 +104,8 @@ struct RowImpulses {
     RowChanges<S> changes;
     const typename Packed<S>::Truth no = Packed<S>::zero() > Packed<S>::zero();
     const bool tired = problem.marks[k].slides >= RowMark::patience;
-    const RowSlides<S> sliding{!no, tired ? !no : no};
+    RowSlides<S> sliding{!no, tired ? !no : no};
+    problem.lookBackAt(group, sliding);
     const auto turned =
         problem.rub(group, row, b1, b2, slipVelocity(row, v_rel, row.n.dot(v_rel), b1, b2), sliding, changes);
     push(b1, b2, changes.dt);

@@ -177,13 +177,30 @@ template <Real S>
   row.jn = jn;
 }
 
-/// Which rows of a group slide.
+/// Which rows of a group slide, and how.
 template <Real S>
 struct RowSlides {
   typename Packed<S>::Truth kinetic;  ///< what cuts friction is the kinetic limit; in others the static one
   typename Packed<S>::Truth tired;    ///< that have begun to too often: they go on, since sweeps must end
   Packed<S> mostLoad = Packed<S>::all(Eigen::NumTraits<S>::highest());  ///< friction is by no more than this
+  /// Of fast ones, else zero: slip and turn across n before the kick. What slides is held against the mean of
+  /// these and what is left, since it may turn in between: contact_problem_way.hpp.
+  PackedVector<S> slipBefore = PackedVector<S>::zero();
+  PackedVector<S> turnBefore = PackedVector<S>::zero();
 };
+
+/// Against what friction holds a slide: along `wanted`, which is against the slip that is left, and against
+/// what there was before as well, by the square of the cosine between them. (So that they never cancel.)
+/// \param mass  of the slip
+template <Real S>
+[[gnu::always_inline]] inline PackedVector<S> againstBoth(const PackedVector<S>& wanted,
+                                                          const Packed<S>& mass,
+                                                          const PackedVector<S>& before) {
+  using P = Packed<S>;
+  const P along = -wanted.dot(before);
+  const P cosine_sq = along * along * reciprocalOf(wanted.squaredNorm() * before.squaredNorm());
+  return wanted - (mass * choose(along > P::zero(), cosine_sq, P::zero())) * before;
+}
 
 /// The tangential impulse of `row` becomes right for its normal one: a row sticks up to the static limit.
 /// \param slip that is to vanish
@@ -203,10 +220,11 @@ template <Real S>
   PackedVector<S> jt = choose(changes.rubs, wanted, row.jt);
   if (changes.slides.any()) {
     const P limit = choose(sliding.kinetic, row.slide, row.stick);
+    const PackedVector<S> against = againstBoth(wanted, reciprocalOf(mobility), sliding.slipBefore);
     // Roots of lanes may take subnormal numbers for 0.
-    const P normal_sq = largerOf(size_sq, P::all(std::numeric_limits<S>::min()));
+    const P normal_sq = largerOf(against.squaredNorm(), P::all(std::numeric_limits<S>::min()));
     const P kept = limit * load / squareRoot(choose(changes.slides, normal_sq, P::all(S(1))));
-    jt = choose(changes.slides, kept * wanted, jt);
+    jt = choose(changes.slides, kept * against, jt);
   }
   changes.dt = jt - row.jt;
   changes.du = mobility * changes.dt;

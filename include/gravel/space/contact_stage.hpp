@@ -140,7 +140,7 @@ class ContactStage {
     parallelFor(bend_.size(), 512, [&](std::size_t i) {
       bend_[i] = frame.acceleration(bodies.positions()[i], bodies.velocities()[i]);
     });
-    const ContactReport<Scalar> half = solver_.solve(bodies, h, {drifts, bend_, frame.omega});
+    const ContactReport<Scalar> half = solver_.solve(bodies, h, {drifts, bend_, frame.omega, h / Scalar(2)});
     acted_ = half.iterations > 0;
     if (!acted_) {
       solver_.forget();  // its impulses are those of the solve before
