@@ -260,3 +260,76 @@ TEMPLATE_TEST_CASE("Orbits saved and taken up go on bit for bit", "",
     }
   }
 }
+
+namespace {
+
+/// A star and two planets, and a force of their velocities: of the air, or magnetic.
+Space<double> draggedPlanets(IntegratorKind kind, double h, bool magnetic) {
+  SimulationConfig<double> config;
+  config.G = 1;
+  config.integrator = kind;
+  config.timeStep = h;
+  config.adaptiveTimeStep = false;
+  Space<double> space(config);
+  space.addBody(ball({0, 0, 0}, {0, 0, 0}, 0.0, 1.0));
+  space.addBody(ball({1, 0, 0}, {0, 1, 0.1}, 0.0, 1e-3));
+  space.addBody(ball({0, -2, 0}, {0.7, 0, 0}, 0.0, 1e-3));
+  space.setForceHook([magnetic](Bodies<double, SoA>& bodies, double) {
+    for (std::size_t i = 1; i < bodies.size(); ++i) {
+      const Vec v = bodies[i].velocity();
+      const Vec a = magnetic ? Vec(0.3 * v[1], -0.3 * v[0], 0) : Vec(-0.05 * v);
+      bodies.forces()[i] += bodies.masses()[i] * a;
+    }
+  });
+  return space;
+}
+
+}  // namespace
+
+// The velocities that a force sees are those of its moment. Seen to fail: brought up by half of the outer
+// step (errors of 9e-2 and 1e-1, of first order).
+TEST_CASE("Forces of velocities are as exact with Gauss-Radau as those of places") {
+  for (const bool magnetic : {false, true}) {
+    SimulationConfig<double> config = plain(0.1);
+    config.integrator = IntegratorKind::GaussRadau15;
+    Space<double> space(config);
+    space.addBody(ball({0, 0, 0}, {1, 0, 0}, 0.0));
+    space.setForceHook([magnetic](Bodies<double, SoA>& bodies, double) {
+      const Vec v = bodies[0].velocity();
+      bodies.forces()[0] += magnetic ? Vec(v[1], -v[0], 0) : Vec(-v);
+    });
+    space.advanceTo(2.0);
+    const Vec exact = magnetic ? Vec(std::cos(2.0), -std::sin(2.0), 0) : Vec(std::exp(-2.0), 0, 0);
+    CAPTURE(magnetic);
+    CHECK((Vec(space.body(0).velocity()) - exact).norm() < 1e-14);
+
+    // And whatever steps it is asked for.
+    Space<double> coarse = draggedPlanets(IntegratorKind::GaussRadau15, 0.5, magnetic);
+    Space<double> fine = draggedPlanets(IntegratorKind::GaussRadau15, 0.05, magnetic);
+    coarse.advanceTo(5.0);
+    fine.advanceTo(5.0);
+    CHECK((Vec(coarse.body(1).position()) - Vec(fine.body(1).position())).norm() < 1e-13);
+  }
+}
+
+// Seen to fail, at first order: brought up by half a step of all of the acceleration, of which the orbit has
+// had its part; not brought up.
+TEST_CASE("Forces of velocities are of second order with Wisdom-Holman") {
+  for (const bool magnetic : {false, true}) {
+    Space<double> exact = draggedPlanets(IntegratorKind::GaussRadau15, 0.5, magnetic);
+    exact.advanceTo(5.0);
+    double before = 0;
+    for (const double h : {0.05, 0.025, 0.0125}) {
+      Space<double> space = draggedPlanets(IntegratorKind::WisdomHolman, h, magnetic);
+      space.advanceTo(5.0);
+      const double error = (Vec(space.body(1).position()) - Vec(exact.body(1).position())).norm();
+      CAPTURE(magnetic, h, before, error);
+      CHECK(error < 1e-2);
+      if (before > 0) {
+        CHECK(std::log2(before / error) > 1.9);
+        CHECK(std::log2(before / error) < 2.1);
+      }
+      before = error;
+    }
+  }
+}

@@ -9,6 +9,8 @@
 
 #include <algorithm>
 #include <numeric>
+#include <span>
+#include <type_traits>
 #include <vector>
 
 namespace gravel {
@@ -28,7 +30,9 @@ template <Real Scalar>
 class WisdomHolman {
  public:
   /// Advances by h [s]. Accelerations must be those of the present positions, and are at the end.
-  /// \param G  as in the forces  \param forces  called once, with h
+  /// \param G  as in the forces
+  /// \param forces  called once, with h and, if it takes them, the changes of velocities that the first kick
+  ///        made, by body: so much, nearly, will the last one add to those that it sees
   /// \throws std::invalid_argument if no body has mass, one is fixed, or one stands at the centre of mass of
   ///   those before it, about which it has no orbit; nothing has moved then
   template <class Layout, class Forces>
@@ -52,7 +56,11 @@ class WisdomHolman {
     fromJacobi(dv_, [&](std::size_t i, const Vector3<Scalar>& d) {
       lost_[i].velocity.add(bodies.velocities()[i], d);
     });
-    forces(h);
+    if constexpr (std::is_invocable_v<Forces&, const Scalar&, std::span<const Vector3<Scalar>>>) {
+      forces(h, std::span<const Vector3<Scalar>>(kicks_));
+    } else {
+      forces(h);
+    }
     toJacobi(bodies.positions(), x_);
     kick(bodies, G, half);
   }
@@ -149,7 +157,9 @@ class WisdomHolman {
     for (Vector3<Scalar>& d : dv_) {
       d *= h;
     }
+    kicks_.resize(bodies.size());
     fromJacobi(dv_, [&](std::size_t i, const Vector3<Scalar>& d) {
+      kicks_[i] = d;
       lost_[i].velocity.add(bodies.velocities()[i], d);
     });
   }
@@ -158,6 +168,7 @@ class WisdomHolman {
   std::vector<Scalar> mass_, share_;    // up to and with each, and its own over that
   std::vector<Vector3<Scalar>> x_, v_;  // Jacobi's coordinates
   std::vector<Vector3<Scalar>> dx_, dv_;
+  std::vector<Vector3<Scalar>> kicks_;  // of the last kick, by body
   Compensation<Scalar> lost_;
 };
 

@@ -24,6 +24,18 @@ namespace gravel {
 template <Real Scalar, class Layout>
 using ForceHook = Callback<void(Bodies<Scalar, Layout>&, Scalar)>;
 
+/// By how much velocities and spins are behind positions where forces are found, half a step after the first
+/// kick. The hook sees them as the last accelerations would bring them up (else a force that depends on them
+/// is of first order, and a magnetic one makes energy).
+template <Real Scalar>
+struct Behind {
+  Scalar velocities = Scalar(0);             ///< [s] of the last accelerations
+  Scalar spins = Scalar(0);                  ///< [s] of the last angular ones
+  std::span<const Vector3<Scalar>> kicks{};  ///< [m s^-1] besides, by body; empty for none
+
+  bool any() const { return velocities > Scalar(0) || spins > Scalar(0) || !kicks.empty(); }
+};
+
 template <Real Scalar, class Layout>
 class ForceStage {
  public:
@@ -50,18 +62,16 @@ class ForceStage {
   }
 
   /// Sets force, torque, acceleration and angular acceleration of every body at the present positions.
-  /// \param ahead [s] that velocities are behind positions, half a step after the first kick: the hook sees
-  ///        them as the last accelerations would bring them up (else a force that depends on them is of first
-  ///        order, and a magnetic one makes energy)
+  /// \param behind  what the hook sees is brought up by that
   /// \param touching  of these bodies it sees the present ones: what contacts add is not known yet
   void evaluate(Bodies<Scalar, Layout>& bodies, const Scalar& G, const Scalar& softening,
                 const Domain<Scalar>& domain, const Scalar& time, Profiler& profiler,
-                const Scalar& ahead = Scalar(0), std::span<const Contact<Scalar>> touching = {}) {
+                const Behind<Scalar>& behind = {}, std::span<const Contact<Scalar>> touching = {}) {
     const std::size_t n = bodies.size();
     now_.clear();
     ahead_.clear();
-    if (hook && ahead > Scalar(0)) {
-      bringUp(bodies, ahead, touching);
+    if (hook && behind.any()) {
+      bringUp(bodies, behind, touching);
     }
     const char* reason = reasonToSkip(bodies, G);
     if (reason == nullptr) {
@@ -176,7 +186,7 @@ class ForceStage {
     Vector3<Scalar> w;
   };
 
-  void bringUp(const Bodies<Scalar, Layout>& bodies, const Scalar& ahead,
+  void bringUp(const Bodies<Scalar, Layout>& bodies, const Behind<Scalar>& behind,
                std::span<const Contact<Scalar>> touching) {
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       const auto body = bodies[i];
@@ -185,8 +195,11 @@ class ForceStage {
     ahead_ = now_;
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       if (!bodies[i].isFixed()) {
-        ahead_[i].v += ahead * Vector3<Scalar>(bodies[i].acceleration());
-        ahead_[i].w += ahead * Vector3<Scalar>(bodies[i].angularAcceleration());
+        ahead_[i].v += behind.velocities * Vector3<Scalar>(bodies[i].acceleration());
+        ahead_[i].w += behind.spins * Vector3<Scalar>(bodies[i].angularAcceleration());
+        if (!behind.kicks.empty()) {
+          ahead_[i].v += behind.kicks[i];
+        }
       }
     }
     for (const Contact<Scalar>& c : touching) {

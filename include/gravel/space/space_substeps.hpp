@@ -128,18 +128,22 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
   const auto kick = [&](const Scalar& time) {
     detail::kickAndDrift(bodies_, time, Scalar(0), torques, lost);
   };
-  const auto forces = [&](const Scalar& passed) {
+  const auto forces = [&](const Scalar& passed, std::span<const Vector> kicks = {}) {
     if (held) {
       return;
     }
     if (late > Scalar(0)) {
       kick(Scalar(-late));  // back to the velocity of the step's middle, as one part has it here
     }
-    // Stages of several drifts stand at no moment of their own.
-    const Scalar ahead =
-        hasSeveralDrifts() && !apart ? Scalar(0) : Scalar((apart ? contact_dt_ : h) / Scalar(2));
+    // Stages of several drifts stand at no moment of their own. What is no row of kicks and drifts brings
+    // velocities to the moment of the forces, or says what they lack, and kicks spins alone.
+    Behind<Scalar> behind{.kicks = kicks};
+    if (!hasSeveralDrifts() || apart) {
+      behind.spins = (apart ? contact_dt_ : h) / Scalar(2);
+      behind.velocities = orbits_.moves(this->config_.integrator) ? Scalar(0) : behind.spins;
+    }
     force_.evaluate(bodies_, getG(), this->config_.softening, contact_.domain,
-                    Scalar(time_ + (start + passed)), profiler_, ahead, contacts().contacts);
+                    Scalar(time_ + (start + passed)), profiler_, behind, contacts().contacts);
     if (late > Scalar(0)) {
       kick(late);
     }
