@@ -13,14 +13,20 @@
 /// through a point of zero acceleration.
 
 #include <gravel/dynamics/adaptive_step.hpp>
-#include <gravel/dynamics/nearest_meeting.hpp>
+#include <gravel/dynamics/largest_pair_rate.hpp>
+
+#include <optional>
 
 namespace gravel {
 
-/// Most bodies for which all pairs are looked at. Above, each body is taken with its likeliest partner: one
-/// of mean mass, at the distance at which it alone would cause the body's acceleration, but not closer than
-/// touching.
+/// Most bodies for which all pairs are looked at. Above, the pair of the largest rate is searched where
+/// masses are unlike; where they are alike, or there are images, each body is taken with its likeliest
+/// partner: one of mean mass, at the distance at which it alone would cause the body's acceleration, but not
+/// closer than touching.
 inline constexpr std::size_t encounterPairs = 128;
+
+/// Masses are unlike from a body on that has more than so many times their mean, tracers aside.
+inline constexpr double unlikeMasses = 4;
 
 namespace detail {
 
@@ -35,13 +41,15 @@ S eighthRoot(const S& x) {
 }
 
 /// All bodies in columns.
-template <class S>
+template <class S, class Scalar>
 class EncounterTable {
  public:
   using Column = Eigen::Array<S, Eigen::Dynamic, 1, 0, static_cast<int>(encounterPairs), 1>;
 
+  /// \param domain  pairs are nearest through its images, which are where they are at `time` [s]
   template <class BodiesType>
-  explicit EncounterTable(const BodiesType& bodies) : n_(static_cast<Eigen::Index>(bodies.size())) {
+  EncounterTable(const BodiesType& bodies, const Domain<Scalar>& domain, const Scalar& time)
+      : n_(static_cast<Eigen::Index>(bodies.size())), domain_(domain), time_(time) {
     for (Column* c : {&x_, &y_, &z_, &u_, &v_, &w_, &m_, &r_, &free_}) {
       c->resize(n_);
     }
@@ -69,6 +77,9 @@ class EncounterTable {
       s = (x_.tail(k) - x_[i]).square() + (y_.tail(k) - y_[i]).square() + (z_.tail(k) - z_[i]).square();
       speed_sq =
           (u_.tail(k) - u_[i]).square() + (v_.tail(k) - v_[i]).square() + (w_.tail(k) - w_[i]).square();
+      if (!domain_.isOpen()) {
+        throughImages(i, s, speed_sq);
+      }
       if (free_[i] == S(0)) {
         speed_sq *= free_.tail(k);
       }
@@ -82,7 +93,7 @@ class EncounterTable {
       }
       s += softening * softening;
       // Two points in one place do not pull each other.
-      s = (s > S(0)).select(s.max(S(1e-60)).inverse(), Column::Constant(k, S(0)));
+      s = (s > S(0)).select(s.max(nearestSquared<S>()).inverse(), Column::Constant(k, S(0)));
       a = speed_sq * s * T_sq;
       b = ((m_.tail(k) + m_[i]) * (G * T_sq)).square() * (s * s * s);
       if (free_[i] == S(0)) {
@@ -93,14 +104,27 @@ class EncounterTable {
   }
 
  private:
+  /// Squares of distances and speeds of i and those after it, by the nearest images.
+  void throughImages(Eigen::Index i, Column& s, Column& speed_sq) const {
+    for (Eigen::Index k = 0, j = i + 1; j < n_; ++k, ++j) {
+      Vector3<Scalar> r = Vector3<S>(x_[j] - x_[i], y_[j] - y_[i], z_[j] - z_[i]).template cast<Scalar>();
+      Vector3<Scalar> v = Vector3<S>(u_[j] - u_[i], v_[j] - v_[i], w_[j] - w_[i]).template cast<Scalar>();
+      domain_.minimumImage(r, v, time_);
+      s[k] = r.template cast<S>().squaredNorm();
+      speed_sq[k] = v.template cast<S>().squaredNorm();
+    }
+  }
+
   Eigen::Index n_;
+  Domain<Scalar> domain_;
+  Scalar time_;
   Column x_, y_, z_, u_, v_, w_, m_, r_;
   Column free_;  ///< 0 for fixed bodies, which ask nothing of each other
   bool spheres_ = false;
 };
 
-/// The largest (rate T)^8 of a body with its likeliest partner, and the largest (T speed)^2 / (radius/4)^2.
-/// O(N).
+/// The largest (rate T)^8 of a body with its likeliest partner of the mean mass (tracers aside), and the
+/// largest (T speed)^2 / (radius/4)^2. O(N).
 template <class S, Real Scalar, class Layout>
 void lookAtLikeliest(const Bodies<Scalar, Layout>& bodies, const Domain<Scalar>& domain, const S& G,
                      const S& softening, const S& T, S& sum, S& approach) {
@@ -111,11 +135,13 @@ void lookAtLikeliest(const Bodies<Scalar, Layout>& bodies, const Domain<Scalar>&
     return Vector3<S>(flow.domain.lessFlow(bodies[i].position(), v).template cast<S>());
   };
   S mass(0);
+  std::size_t massive = 0;
   Vector3<S> v_cm = Vector3<S>::Zero();
   Vector3<S> a_cm = Vector3<S>::Zero();
   for (std::size_t i = 0; i < n; ++i) {
     const S m = S(bodies.masses()[i]);
     mass += m;
+    massive += m > S(0) ? 1U : 0U;
     v_cm += lessFlow(i, bodies[i].countingVelocity()) * m;
     a_cm += bodies.accelerations()[i].template cast<S>() * m;
   }
@@ -127,7 +153,7 @@ void lookAtLikeliest(const Bodies<Scalar, Layout>& bodies, const Domain<Scalar>&
     return S(Vector3<S>(lessFlow(i, bodies.velocities()[i]) - v_cm).squaredNorm() * T * T);
   };
   const S sheared = S(flow.across) * T;
-  const S Gm = G * mass / S(static_cast<double>(n)) * T * T;
+  const S Gm = massive > 0 ? S(G * mass / S(static_cast<double>(massive)) * T * T) : S(0);
   sum = -orderedMin(n, 2048, S(0), [&](std::size_t i) {
     const auto body = bodies[i];
     const S a = Vector3<S>(body.acceleration().template cast<S>() - a_cm).norm() * T * T;
@@ -156,32 +182,65 @@ void lookAtLikeliest(const Bodies<Scalar, Layout>& bodies, const Domain<Scalar>&
 
 }  // namespace detail
 
+namespace detail {
+
+/// See unlikeMasses. O(N).
+template <class S, class BodiesType>
+bool haveUnlikeMasses(const BodiesType& bodies) {
+  S sum(0);
+  S heaviest(0);
+  std::size_t massive = 0;
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const S m = S(bodies.masses()[i]);
+    sum += m;
+    heaviest = std::max<S>(heaviest, m);
+    massive += m > S(0) ? 1U : 0U;
+  }
+  return S(static_cast<double>(massive)) * heaviest > S(unlikeMasses) * sum;
+}
+
+}  // namespace detail
+
 /// The step by the rules above, within the limits and not below 1e-12 of the longest; nor does any pair meet
 /// deeper than a quarter of the smaller radius in a step. Up to `encounterPairs` bodies O(N^2), about as dear
-/// as their gravity. Above O(N); there it is enough, too, if no sphere moves by more than a quarter of its
-/// radius, relative to the common centre of mass, and only where that asks for a shorter step pairs are
-/// searched, in O(N log N).
-/// \param domain unless open, pairs may be nearest through images: above is then meant for any number, and no
-///        sphere moves by more than a quarter of its radius, the flow left out as in adaptive_step.hpp
+/// as their gravity. Above O(N), or O(N log N) where masses are unlike; there it is enough, too, if no sphere
+/// moves by more than a quarter of its radius, relative to the common centre of mass, and only where that
+/// asks for a shorter step pairs are searched, in O(N log N). \param domain unless open, pairs are nearest
+/// through images: above the likeliest partner is meant for any
+///        masses, and for any number no sphere moves by more than a quarter of its radius, the flow left out
+///        as in adaptive_step.hpp
+/// \param time [s] for a domain that shears
 template <Real Scalar, class Layout>
 Scalar stepFromEncounters(const Bodies<Scalar, Layout>& bodies, const Scalar& G, const Scalar& softening,
-                          const StepLimits<Scalar>& limits, const Domain<Scalar>& domain = {}) {
+                          const StepLimits<Scalar>& limits, const Domain<Scalar>& domain = {},
+                          const Scalar& time = Scalar(0)) {
   using S = detail::RateScalar<Scalar>;
   using std::sqrt;
   const S T = S(limits.largest) / S(limits.factor);
   S sum(0);
   S approach(0);
   const bool few = bodies.size() <= encounterPairs;
-  if (domain.isOpen() && few) {
-    detail::EncounterTable<S>(bodies).look(S(G), S(softening), T, sum, approach);
-  } else {
+  std::optional<detail::LargestPairRate<S>> pairs;
+  if (!few || !domain.isOpen()) {
     detail::lookAtLikeliest<S>(bodies, domain, S(G), S(softening), T, sum, approach);
+  }
+  if (few) {
+    S meets(0);
+    sum = S(0);
+    detail::EncounterTable<S, Scalar>(bodies, domain, time).look(S(G), S(softening), T, sum, meets);
+    approach = domain.isOpen() ? meets : approach;
+  } else if (domain.isOpen() && detail::haveUnlikeMasses<S>(bodies)) {
+    pairs.emplace(bodies);
+    sum = pairs->of(detail::EncounterRate<S>{S(G), T, S(softening)}, Eigen::NumTraits<S>::highest());
   }
   S h = S(limits.largest) / detail::eighthRoot(S(S(1) + sum));
   const S longest = S(limits.contactSteps) * T;  // over the square root of an approach
   if (domain.isOpen() && !few && longest < h * sqrt(approach)) {
     const S enough = approach / (T * T);
-    const S most = detail::NearestMeeting<S>(bodies).mostRateSq(enough);
+    if (!pairs) {
+      pairs.emplace(bodies);
+    }
+    const S most = pairs->of(detail::MeetingRate<S>{}, enough);
     approach = most < enough ? S(T * T * most) : approach;
   }
   if (approach > S(0)) {

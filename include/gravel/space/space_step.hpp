@@ -224,8 +224,8 @@ void Space<Scalar, Layout>::updateAdaptiveTimeStep() {
     wanted = stepFromMotion(bodies_, c.softening, limits, !contact_.boundaries.empty(), contact_.domain);
   }
   if (pulls) {
-    wanted =
-        std::min<Scalar>(wanted, stepFromEncounters(bodies_, getG(), c.softening, limits, contact_.domain));
+    wanted = std::min<Scalar>(
+        wanted, stepFromEncounters(bodies_, getG(), c.softening, limits, contact_.domain, time_));
     wanted = std::clamp<Scalar>(limits.contactSteps * piles_.longest(bodies_, contacts()), limits.smallest,
                                 wanted);
   }
