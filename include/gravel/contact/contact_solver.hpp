@@ -189,9 +189,12 @@ class ContactSolver {
   }
   const ContactColoring& coloring() const { return coloring_; }
 
-  /// What the last solve() did to the velocity of a body [m s^-1].
+  /// What the last solve() did to the velocity of a body [m s^-1], and to its spin [rad/s].
   Vector3<S> changeOf(std::uint32_t body) const {
     return goesOn_ ? problem_.changeOf(coloring_.slotOf(body)) : Vector3<S>(Vector3<S>::Zero());
+  }
+  Vector3<S> turnOf(std::uint32_t body) const {
+    return goesOn_ ? problem_.turnOf(coloring_.slotOf(body)) : Vector3<S>(Vector3<S>::Zero());
   }
 
   /// Whether a body has contacts of begin().

@@ -39,9 +39,13 @@ class ProblemBodies {
   /// what hangs together with it.
   const S& fallOf(std::uint32_t slot) const { return initial[slot].fall; }
 
-  /// What impulses did to the velocity of a body [m s^-1].
+  /// What impulses did to the velocity of a body [m s^-1], and to its spin [rad/s].
   Vector3<S> changeOf(std::uint32_t slot) const {
     return scaled<S>(Vector3<S>(bodies[slot].v - initial[slot].v), -speedExponent_);
+  }
+  Vector3<S> turnOf(std::uint32_t slot) const {
+    const Vector3<S> ds = scaled<S>(Vector3<S>(bodies[slot].s - initial[slot].s), -speedExponent_);
+    return ds * reciprocal<S>(initial[slot].radius);
   }
 
   /// Impulses and energies in SI units from those of the scaled problem, and back.

@@ -86,31 +86,7 @@ class ContactStage {
   void addEnded(const Bodies& bodies, Touches& all) const;
 
   /// Shrinks overlaps by moving bodies, and renews the geometry of the contacts, on which impulses act.
-  void separate(Bodies& bodies, const Config& config, const Scalar& time, Profiler& profiler) {
-    moved_ = false;
-    separationLoss_ = Scalar(0);
-    if (contacts_.empty()) {
-      profiler.skip(Phase::Colouring, "no contacts");
-      profiler.skip(Phase::PositionalCorrection, "no contacts");
-      return;
-    }
-    colour(bodies, profiler);
-    if (config.positionalCorrectionFactor == Scalar(0)) {
-      profiler.skip(Phase::PositionalCorrection, "positionalCorrectionFactor is 0");
-      return;
-    }
-    const Profiler::Scope scope(profiler, Phase::PositionalCorrection);
-    const CorrectionSettings<Scalar> settings{
-        .factor = config.positionalCorrectionFactor,
-        .maxIterations = sweepsOfLooks(contacts_.size()),
-        .islandLooks = usualLooks,
-        .keepAngularMomentum = domain.isOpen()};  // images have none to keep
-    separationLoss_ = solver_.correctPositions(bodies, settings).loss;
-    moved_ = !solver_.displacements().empty();
-    if (moved_) {
-      renewGeometry(bodies, config, time);
-    }
-  }
+  void separate(Bodies& bodies, const Config& config, const Scalar& time, Profiler& profiler);
 
   /// Energy that moving bodies apart took [J]: F.d by the forces at the new places, exact to the square of
   /// the displacement d, what it took of their motion, and its share of the kick [s] that follows.
@@ -147,6 +123,9 @@ class ContactStage {
     }
     report_.addSolve(half);
   }
+
+  /// What the first half's solve did, for its kick [s]. O(N).
+  void tellChanges(const Bodies& bodies, const Scalar& kick, ContactKicks<Scalar>& kicks) const;
 
   /// Bodies merged, and the step goes on: contacts of these pairs of ids are not what they were.
   void endMerged(const Bodies& bodies, const std::vector<std::pair<BodyId, BodyId>>& merges);

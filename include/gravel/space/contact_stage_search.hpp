@@ -1,7 +1,7 @@
 #pragma once
 
 /// \file
-/// Members of `ContactStage` that look for contacts.
+/// Members of `ContactStage` that look for contacts, and open them where they overlap.
 
 #include <gravel/space/contact_stage.hpp>
 
@@ -77,6 +77,34 @@ void ContactStage<Scalar, Layout>::checkSizes(const Bodies& bodies) const {
                      detail::formatReal(Scalar(bodies.radii()[i])),
                      "at most half an edge of the domain, " + detail::formatReal(most));
     }
+  }
+}
+
+template <Real Scalar, class Layout>
+void ContactStage<Scalar, Layout>::separate(Bodies& bodies, const Config& config, const Scalar& time,
+                                            Profiler& profiler) {
+  moved_ = false;
+  separationLoss_ = Scalar(0);
+  if (contacts_.empty()) {
+    profiler.skip(Phase::Colouring, "no contacts");
+    profiler.skip(Phase::PositionalCorrection, "no contacts");
+    return;
+  }
+  colour(bodies, profiler);
+  if (config.positionalCorrectionFactor == Scalar(0)) {
+    profiler.skip(Phase::PositionalCorrection, "positionalCorrectionFactor is 0");
+    return;
+  }
+  const Profiler::Scope scope(profiler, Phase::PositionalCorrection);
+  const CorrectionSettings<Scalar> settings{
+      .factor = config.positionalCorrectionFactor,
+      .maxIterations = sweepsOfLooks(contacts_.size()),
+      .islandLooks = usualLooks,
+      .keepAngularMomentum = domain.isOpen()};  // images have none to keep
+  separationLoss_ = solver_.correctPositions(bodies, settings).loss;
+  moved_ = !solver_.displacements().empty();
+  if (moved_) {
+    renewGeometry(bodies, config, time);
   }
 }
 

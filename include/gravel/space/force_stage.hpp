@@ -36,12 +36,24 @@ struct Behind {
   bool any() const { return velocities > Scalar(0) || spins > Scalar(0) || !kicks.empty(); }
 };
 
+/// What contacts did to velocities [m s^-1] and spins [rad/s] in the first half of a step, by body. In the
+/// second half they will do nearly the same, so that what rests is seen at rest.
+template <Real Scalar>
+struct ContactKicks {
+  std::vector<Vector3<Scalar>> velocities, spins;
+  void clear() {
+    velocities.clear();
+    spins.clear();
+  }
+};
+
 template <Real Scalar, class Layout>
 class ForceStage {
  public:
   Vector3<Scalar> field = Vector3<Scalar>::Zero();  ///< [m s^-2], acts on movable bodies
   ForceHook<Scalar, Layout> hook;
   GravitySolver<Scalar> gravity;
+  ContactKicks<Scalar> contactKicks;  ///< where there is a hook, until the next evaluation; empty for none
 
   bool hasTorques() const { return static_cast<bool>(hook); }
 
@@ -63,15 +75,14 @@ class ForceStage {
 
   /// Sets force, torque, acceleration and angular acceleration of every body at the present positions.
   /// \param behind  what the hook sees is brought up by that
-  /// \param touching  of these bodies it sees the present ones: what contacts add is not known yet
   void evaluate(Bodies<Scalar, Layout>& bodies, const Scalar& G, const Scalar& softening,
                 const Domain<Scalar>& domain, const Scalar& time, Profiler& profiler,
-                const Behind<Scalar>& behind = {}, std::span<const Contact<Scalar>> touching = {}) {
+                const Behind<Scalar>& behind = {}) {
     const std::size_t n = bodies.size();
     now_.clear();
     ahead_.clear();
     if (hook && behind.any()) {
-      bringUp(bodies, behind, touching);
+      bringUp(bodies, behind);
     }
     const char* reason = reasonToSkip(bodies, G);
     if (reason == nullptr) {
@@ -186,13 +197,13 @@ class ForceStage {
     Vector3<Scalar> w;
   };
 
-  void bringUp(const Bodies<Scalar, Layout>& bodies, const Behind<Scalar>& behind,
-               std::span<const Contact<Scalar>> touching) {
+  void bringUp(const Bodies<Scalar, Layout>& bodies, const Behind<Scalar>& behind) {
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       const auto body = bodies[i];
       now_.push_back({body.velocity(), body.angularVelocity()});
     }
     ahead_ = now_;
+    const bool touches = contactKicks.velocities.size() == bodies.size();
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       if (!bodies[i].isFixed()) {
         ahead_[i].v += behind.velocities * Vector3<Scalar>(bodies[i].acceleration());
@@ -200,14 +211,13 @@ class ForceStage {
         if (!behind.kicks.empty()) {
           ahead_[i].v += behind.kicks[i];
         }
+        if (touches) {
+          ahead_[i].v += contactKicks.velocities[i];
+          ahead_[i].w += contactKicks.spins[i];
+        }
       }
     }
-    for (const Contact<Scalar>& c : touching) {
-      ahead_[c.first] = now_[c.first];
-      if (c.second != staticPartner) {
-        ahead_[c.second] = now_[c.second];
-      }
-    }
+    contactKicks.clear();
   }
   static void show(Bodies<Scalar, Layout>& bodies, const std::vector<Motion>& motions) {
     for (std::size_t i = 0; i < motions.size(); ++i) {

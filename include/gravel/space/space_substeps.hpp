@@ -48,6 +48,9 @@ struct Space<Scalar, Layout>::Departure {
       space->contact_.drivePlanes(part.middle);
       space->resolveCollisions(true);
       space->contact_.endFirstHalf(space->bodies_, kick);
+      if (space->force_.hook) {
+        space->contact_.tellChanges(space->bodies_, kick, space->force_.contactKicks);
+      }
     }
     space->contact_.strike(space->bodies_, space->config_, HillFrame<Scalar>(space->contact_.domain),
                            Scalar(space->time_ + start), h, part, space->profiler_);
@@ -104,6 +107,7 @@ std::size_t Space<Scalar, Layout>::chooseParts(const Scalar& h) {
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size_t parts) {
   forcesValid_ = false;  // if a hook throws
+  force_.contactKicks.clear();
   const bool last = part + 1 == parts;
   const auto share = [&](std::size_t k) {
     return k == 0 ? Scalar(0)
@@ -143,7 +147,7 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
       behind.velocities = orbits_.moves(this->config_.integrator) ? Scalar(0) : behind.spins;
     }
     force_.evaluate(bodies_, getG(), this->config_.softening, contact_.domain,
-                    Scalar(time_ + (start + passed)), profiler_, behind, contacts().contacts);
+                    Scalar(time_ + (start + passed)), profiler_, behind);
     if (late > Scalar(0)) {
       kick(late);
     }
