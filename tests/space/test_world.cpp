@@ -205,8 +205,8 @@ TEST_CASE("A user's force that depends on velocity is of the second order of the
 }
 
 // A ball that rolls, in a field that turns its way, in the air, and braked by a torque: as F or (T/R) over m
-// (1 + k). Seen to fail: it sees the present velocities (order 1, 3e-2 to 9e-2 at 0.02); contacts brought it
-// up without its spin (the torque, order 1).
+// (1 + k). Seen to fail: it sees the present velocities (order 1, 2.7e-3 to 2.6e-2 at 0.02); the spin is not
+// brought up by contacts (the torque, order 1).
 TEST_CASE(
     "A user's force that depends on the velocity or spin of what rolls is of the second order of the step") {
   const auto error = [](double h, int kind, std::size_t parts) {
