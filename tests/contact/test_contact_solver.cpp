@@ -1046,6 +1046,47 @@ TEST_CASE("contacts of bodies that do not exist and settings out of range are re
                     ContainsSubstring("maxIterations is 0"));
   CHECK_THROWS_WITH(solver.setSettings(with([](auto& s) { s.restitutionThreshold = -1; })),
                     ContainsSubstring("restitutionThreshold is -1"));
+  contacts[0].surface = 0;
+  CHECK_THROWS_WITH(solver.solve(contacts, bodies, -1.0), ContainsSubstring("step of a contact solve is -1"));
+  CHECK_THROWS_AS(solver.solve(contacts, bodies, std::nan("")), std::invalid_argument);
+}
+
+// Seen to fail: read beyond its end.
+TEST_CASE("a user's arrays of unlike lengths are refused, naming which") {
+  std::vector<Vector3<double>> x(2, Vector3<double>(0, 0, 0)), v = x, w = x, a = x;
+  x[1] = {1.9, 0, 0};
+  std::vector<double> m(2, 1.0), r(2, 1.0), k(2, 0.4);
+  std::vector<std::uint64_t> ids{1, 2};
+  std::vector<std::uint32_t> zeros(2, 0);
+  const std::vector<Material<double>> materials(1);
+  const std::vector<Pair> pairs{{0, 1}};
+  const auto arrays = [&] { return ContactArrays<double>{x, v, w, a, m, r, k, zeros, ids, zeros}; };
+  NarrowPhase<double> narrow;
+  ContactList<double> contacts;
+  const auto find = [&] {
+    narrow.find(pairs, arrays(), Domain<double>::open(), MaterialView<double>(materials, {}), {}, {},
+                contacts);
+  };
+  find();
+  REQUIRE(contacts.size() == 1);
+  ContactSolver<double> solver;
+  const auto refuses = [&](auto& column, const char* what) {
+    const auto whole = column;
+    column.pop_back();
+    CHECK_THROWS_WITH(find(), ContainsSubstring("length of " + std::string(what) + " is 1"));
+    ContactArrays<double> cut = arrays();
+    CHECK_THROWS_WITH(solver.solve(contacts, cut, 0.1), ContainsSubstring("that of positions, 2"));
+    column = whole;
+  };
+  refuses(v, "velocities");
+  refuses(w, "angular velocities");
+  refuses(a, "accelerations");
+  refuses(m, "masses");
+  refuses(r, "radii");
+  refuses(k, "inertia factors");
+  refuses(ids, "ids");
+  refuses(zeros, "flags");
+  CHECK(contacts.size() == 1);
 }
 
 TEMPLATE_TEST_CASE("every layout, and a user's own arrays, give the same bits", "",

@@ -335,7 +335,6 @@ TEMPLATE_TEST_CASE("rows that slid and turned before are held against the mean o
   using S = TestType;
   using V = Vector3<S>;
   using P = detail::Packed<S>;
-  constexpr std::size_t width = detail::RowGroup<S>::width;
   const CounterRandom random(9);
   std::uint64_t counter = 0;
   const auto one = [&] { return S(random.uniform(counter++, -1, 1)); };

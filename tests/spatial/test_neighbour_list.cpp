@@ -361,6 +361,11 @@ TEST_CASE("a list refuses bad values, also in the middle of reuse, and recovers"
   update();
   CHECK(list.rebuilt());
   CHECK_THROWS_WITH(update(-1.0), ContainsSubstring("margin of a neighbour list is -1"));
+  const double last = cloud.radii.back();
+  cloud.radii.pop_back();  // while the list would still hold
+  CHECK_THROWS_WITH(update(), ContainsSubstring("length of radii and ids is 99 and 100"));
+  cloud.radii.push_back(last);
+  update();
   CHECK_THROWS_WITH(list.setSkin(-0.5), ContainsSubstring("skin is -0.5; allowed: finite, >= 0"));
 }
 

@@ -116,6 +116,14 @@ TEST_CASE("a k-d tree refuses coordinates that are not finite") {
   CHECK_THROWS_WITH(tree.build(points), ContainsSubstring("position 2 of a k-d tree is (0, nan, 0)"));
 }
 
+// Seen to fail: it never came back.
+TEST_CASE("a grid refuses an edge of cells that is not above zero") {
+  UniformGrid<double> grid;
+  const std::vector<Vector3<double>> points{{0, 0, 0}, {1, 0, 0}};
+  CHECK_THROWS_WITH(grid.build(points, 0.0), ContainsSubstring("edge of a cell is 0"));
+  CHECK_THROWS_AS(grid.build(points, std::nan("")), std::invalid_argument);
+}
+
 TEMPLATE_TEST_CASE("Morton order is a permutation in which keys ascend, ties by index", "", float, double,
                    long double) {
   using S = TestType;

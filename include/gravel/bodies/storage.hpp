@@ -66,6 +66,20 @@ class ColumnStorage {
  public:
   using Scalar = S;
 
+  ColumnStorage() = default;
+  ColumnStorage(const ColumnStorage&) = default;
+  ColumnStorage& operator=(const ColumnStorage&) = default;
+  ~ColumnStorage() = default;
+  /// The other one is left empty.
+  ColumnStorage(ColumnStorage&& other) noexcept { *this = std::move(other); }
+  ColumnStorage& operator=(ColumnStorage&& other) noexcept {
+    reals_ = std::move(other.reals_);
+    integers_ = std::move(other.integers_);
+    size_ = std::exchange(other.size_, 0);
+    capacity_ = std::exchange(other.capacity_, 0);
+    return *this;
+  }
+
   std::size_t size() const { return size_; }
 
   /// Keeps the first min(n, size()) bodies; new ones are all zero. Moves bodies in memory.
@@ -175,6 +189,17 @@ struct AoSoA {
   using Storage = ColumnStorage<Scalar, detail::AoSoAMapping<W>>;
 };
 
+namespace detail {
+
+/// What stands for a vector in place: an expression of Eigen's with these scalars.
+template <class X, class S>
+concept VectorInPlace = requires(X x) {
+  { x.squaredNorm() } -> std::same_as<S>;
+  x += Vector3<S>();
+};
+
+}  // namespace detail
+
 /// A storage of bodies: `size()`, `resize(n)` and `at(field, i)` for every field of `RealFields` and
 /// `IntegerFields`; `reserve(n)` and `swap(i, j)` are used where they exist. Without `swap`, bodies are moved
 /// field by field, and whatever else a storage keeps of a body stays behind. To bind another simulator's
@@ -198,6 +223,13 @@ concept BodyStorage = Real<typename T::Scalar> && std::movable<T> && requires(T 
   { c.at(fields::Id{}, i) } -> std::convertible_to<std::uint64_t>;
   { c.at(fields::Material{}, i) } -> std::convertible_to<std::uint32_t>;
   { c.at(fields::Flags{}, i) } -> std::convertible_to<std::uint32_t>;
+  requires detail::VectorInPlace<decltype(s.at(fields::Position{}, i)), typename T::Scalar>;
+  requires detail::VectorInPlace<decltype(s.at(fields::Velocity{}, i)), typename T::Scalar>;
+  requires detail::VectorInPlace<decltype(s.at(fields::AngularVelocity{}, i)), typename T::Scalar>;
+  requires detail::VectorInPlace<decltype(s.at(fields::Force{}, i)), typename T::Scalar>;
+  requires detail::VectorInPlace<decltype(s.at(fields::Torque{}, i)), typename T::Scalar>;
+  requires detail::VectorInPlace<decltype(s.at(fields::Acceleration{}, i)), typename T::Scalar>;
+  requires detail::VectorInPlace<decltype(s.at(fields::AngularAcceleration{}, i)), typename T::Scalar>;
   s.at(fields::Position{}, i) = Vector3<typename T::Scalar>();
   s.at(fields::Velocity{}, i) = Vector3<typename T::Scalar>();
   s.at(fields::AngularVelocity{}, i) = Vector3<typename T::Scalar>();

@@ -50,9 +50,36 @@ struct ContactArrays {
   auto flags() const { return flag; }
   auto ids() const { return id; }
   auto materials() const { return material; }
+
+  /// Called where contacts are found and taken up. \throws std::invalid_argument unless all are of one length
+  void checkLengths() const {
+    const auto require = [this](const char* what, std::size_t length) {
+      if (length != size()) {
+        detail::refuse(std::string("length of ") + what, std::to_string(length),
+                       "that of positions, " + std::to_string(size()));
+      }
+    };
+    require("velocities", velocity.size());
+    require("angular velocities", angularVelocity.size());
+    require("accelerations", acceleration.size());
+    require("masses", mass.size());
+    require("radii", radius.size());
+    require("inertia factors", inertiaFactor.size());
+    require("flags", flag.size());
+    require("ids", id.size());
+    require("materials", material.size());
+  }
 };
 
 namespace detail {
+
+/// What can say whether it is whole does so.
+template <class B>
+void requireWhole(const B& bodies) {
+  if constexpr (requires { bodies.checkLengths(); }) {
+    bodies.checkLengths();
+  }
+}
 
 /// True for a body that contacts can move: not fixed, not asleep, and with a mass.
 template <class B>

@@ -117,6 +117,7 @@ template <Real S>
 template <ContactBodies B>
 ContactFacts<S> ContactFacts<S>::of(const ContactView<S>& contacts, const B& bodies,
                                     std::span<const ContactName> before) {
+  detail::requireWhole(bodies);
   return orderedSum(contacts.size(), 512, ContactFacts{}, [&](std::size_t begin, std::size_t end) {
     ContactFacts part;
     for (std::size_t k = begin; k < end; ++k) {

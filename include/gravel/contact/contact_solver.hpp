@@ -82,6 +82,7 @@ class ContactSolver {
   /// \param dt [s] >= 0, the step for which the contacts stand
   template <ContactBodies B>
   ContactReport<S> solve(B& bodies, const S& dt, const WayAhead<S>& way = {}) {
+    detail::require("step of a contact solve", dt, detail::nonNegative<S>());
     const ContactView<S>& contacts = contacts_;
     ContactReport<S> report;
     const bool goesOn = goesOn_;

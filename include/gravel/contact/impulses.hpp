@@ -12,98 +12,9 @@
 /// spheres (k = 2/5, c = 1) by 7/2 J/m*. Normal and tangential impulse do not feel each other, hence each is
 /// exact on its own.
 
-#include <gravel/core/types.hpp>
+#include <gravel/core/sizes.hpp>
 
 namespace gravel {
-
-namespace detail {
-
-/// |x|; from comparisons where it must be, since a user's scalar need not have abs().
-template <Real Scalar>
-[[gnu::always_inline]] inline Scalar sizeOf(const Scalar& x) {
-  if constexpr (std::is_floating_point_v<Scalar>) {
-    return std::abs(x);
-  } else {
-    return x < Scalar(0) ? Scalar(-x) : x;
-  }
-}
-
-/// Largest |coefficient|.
-template <Real Scalar>
-Scalar maxAbs(const Vector3<Scalar>& v) {
-  Scalar largest(0);
-  for (int c = 0; c < 3; ++c) {
-    const Scalar size = sizeOf<Scalar>(v[c]);
-    largest = size <= largest ? largest : size;  // keeps a NaN
-  }
-  return largest;
-}
-
-/// |x| + |y| + |z|, at least |v|.
-template <Real Scalar>
-[[gnu::always_inline]] inline Scalar sumAbs(const Vector3<Scalar>& v) {
-  return sizeOf<Scalar>(v[0]) + sizeOf<Scalar>(v[1]) + sizeOf<Scalar>(v[2]);
-}
-
-/// |v| of a vector whose square leaves the range of numbers.
-template <Real Scalar>
-Scalar scaledNorm(const Vector3<Scalar>& v) {
-  const Scalar largest = maxAbs(v);
-  if (!(largest > Scalar(0)) || !std::isfinite(largest)) {
-    return largest;
-  }
-  int exponent = 0;
-  (void)std::frexp(largest, &exponent);
-  const Vector3<Scalar> scaled(std::ldexp(v[0], -exponent), std::ldexp(v[1], -exponent),
-                               std::ldexp(v[2], -exponent));
-  return std::ldexp(std::sqrt(scaled.squaredNorm()), exponent);
-}
-
-/// |v| without overflow or underflow of the squares.
-template <Real Scalar>
-[[gnu::always_inline]] inline Scalar safeNorm(const Vector3<Scalar>& v) {
-  using std::sqrt;
-  const Scalar sq = v.squaredNorm();
-  if constexpr (std::is_floating_point_v<Scalar>) {
-    constexpr Scalar tiny = std::numeric_limits<Scalar>::min() / std::numeric_limits<Scalar>::epsilon();
-    if (!(sq > tiny) || !(sq < std::numeric_limits<Scalar>::max())) {
-      return scaledNorm(v);
-    }
-  }
-  return Scalar(sqrt(sq));
-}
-
-/// v / |v|, of length |v| in the range where squares leave that of numbers.
-template <Real Scalar>
-Vector3<Scalar> scaledUnit(const Vector3<Scalar>& v) {
-  int exponent = 0;
-  (void)std::frexp(maxAbs(v), &exponent);
-  const Vector3<Scalar> scaled(std::ldexp(v[0], -exponent), std::ldexp(v[1], -exponent),
-                               std::ldexp(v[2], -exponent));
-  return scaled / std::sqrt(scaled.squaredNorm());
-}
-
-/// v / length for length = |v|; v itself where it is zero or not finite.
-template <Real Scalar>
-[[gnu::always_inline]] inline Vector3<Scalar> safeUnit(const Vector3<Scalar>& v, const Scalar& length) {
-  if (!(length > Scalar(0))) {
-    return v;
-  }
-  if constexpr (std::is_floating_point_v<Scalar>) {
-    if (length < std::numeric_limits<Scalar>::min() / std::numeric_limits<Scalar>::epsilon() ||
-        !std::isfinite(length)) {  // v / length would lose digits: bring it to order one first
-      return scaledUnit(v);
-    }
-  }
-  return v / length;
-}
-
-template <Real Scalar>
-Vector3<Scalar> safeUnit(const Vector3<Scalar>& v) {
-  return safeUnit(v, safeNorm(v));
-}
-
-}  // namespace detail
 
 /// How two bodies share a change of their relative velocity: first + second = 1, by inverse mass. Both 0 if
 /// neither moves. `effective` is m* = 1/(1/m1 + 1/m2).

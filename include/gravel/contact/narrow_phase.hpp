@@ -32,6 +32,8 @@ class NarrowPhase {
             const MaterialView<S>& materials, std::span<const HalfSpace<S>> boundaries,
             const NarrowPhaseSettings<S>& settings, ContactList<S>& out,
             std::optional<std::span<const std::uint32_t>> nearBoundaries = std::nullopt) {
+    detail::requireWhole(bodies);
+    detail::require("margin of contacts", settings.margin, detail::nonNegative<S>());
     walls_.find(bodies, materials, boundaries, settings, nearBoundaries);
     if (!pairs.empty()) {
       spheres_.resize(bodies.size());

@@ -25,7 +25,7 @@ namespace gravel {
 template <Real Scalar>
 struct StepLimits {
   Scalar factor = Scalar(0.02);     ///< eta [1]; 2 pi / eta steps per circular orbit
-  Scalar smallest = Scalar(0);      ///< [s]
+  Scalar smallest = Scalar(0);      ///< [s] the longest counts if this is more
   Scalar largest = Scalar(1);       ///< [s]
   Scalar contactSteps = Scalar(1);  ///< contact steps in one step: only these must be short against radii
 };
@@ -108,7 +108,7 @@ Scalar stepFromMotion(const Bodies<Scalar, Layout>& bodies, const Scalar& soften
     }
     return tau;
   });
-  return std::clamp<Scalar>(limits.factor * least, limits.smallest, limits.largest);
+  return std::min<Scalar>(std::max<Scalar>(limits.factor * least, limits.smallest), limits.largest);
 }
 
 }  // namespace gravel

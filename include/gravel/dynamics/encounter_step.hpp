@@ -246,8 +246,8 @@ Scalar stepFromEncounters(const Bodies<Scalar, Layout>& bodies, const Scalar& G,
   if (approach > S(0)) {
     h = std::min<S>(h, longest / sqrt(approach));
   }
-  return std::clamp<Scalar>(Scalar(h), std::max<Scalar>(limits.smallest, limits.largest * Scalar(1e-12)),
-                            limits.largest);
+  const Scalar least = std::max<Scalar>(limits.smallest, limits.largest * Scalar(1e-12));
+  return std::min<Scalar>(std::max<Scalar>(Scalar(h), least), limits.largest);
 }
 
 /// The step after one of length `last`, where the state between them asks for `wanted`: the two steps' mean

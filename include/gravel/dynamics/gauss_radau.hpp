@@ -92,8 +92,8 @@ class GaussRadau15 {
   static Scalar firstStep(const Bodies<Scalar, Layout>& bodies, const Scalar& h) {
     Scalar step = h;
     for (std::size_t i = 0; i < bodies.size(); ++i) {
-      const Scalar v = bodies[i].countingVelocity().cwiseAbs().maxCoeff();
-      const Scalar a = bodies.accelerations()[i].cwiseAbs().maxCoeff();
+      const Scalar v = detail::maxAbs<Scalar>(bodies[i].countingVelocity());
+      const Scalar a = detail::maxAbs<Scalar>(Vector3<Scalar>(bodies.accelerations()[i]));
       if (v > Scalar(0) && a > Scalar(0)) {
         step = std::min<Scalar>(step, v / a / Scalar(100));
       }
@@ -246,7 +246,8 @@ class GaussRadau15 {
         change = std::max<Scalar>(change, f.template segment<3>(at).abs().maxCoeff());
       }
       // Places at the start and at the last node.
-      const Scalar now = bodies.positions()[static_cast<std::size_t>(at / 3)].cwiseAbs().maxCoeff();
+      const Scalar now =
+          detail::maxAbs<Scalar>(Vector3<Scalar>(bodies.positions()[static_cast<std::size_t>(at / 3)]));
       const Scalar place = std::max<Scalar>(now, last_.x.template segment<3>(at).abs().maxCoeff());
       return change <= Scalar(16) * eps * largest ||
              change * dt_sq <= eps * std::max<Scalar>(place, last_.fixedPlace);

@@ -4,6 +4,7 @@
 /// What the Gauss-Radau method knows from one step to the next.
 
 #include <gravel/bodies/bodies.hpp>
+#include <gravel/core/sizes.hpp>
 
 #include <algorithm>
 #include <array>
@@ -49,7 +50,8 @@ struct RadauState {
     fixedPlace = Scalar(0);
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       if (bodies[i].isFixed()) {
-        fixedPlace = std::max<Scalar>(fixedPlace, bodies.positions()[i].cwiseAbs().maxCoeff());
+        fixedPlace =
+            std::max<Scalar>(fixedPlace, detail::maxAbs<Scalar>(Vector3<Scalar>(bodies.positions()[i])));
       }
       const auto at = static_cast<Eigen::Index>(3 * i);
       compare(x.template segment<3>(at), xLow.template segment<3>(at), bodies.positions()[i]);

@@ -31,7 +31,7 @@ class PileStep {
   template <ContactBodies B>
   Scalar longest(const B& bodies, const ContactView<Scalar>& contacts) {
     using std::sqrt;
-    Scalar least = std::numeric_limits<double>::infinity();
+    auto least = Scalar(std::numeric_limits<double>::infinity());
     if (contacts.empty()) {
       return least;
     }

@@ -64,7 +64,10 @@ class Settings {
   void setContactIterations(std::size_t most) { assign(&SimulationConfig<Scalar>::contactIterations, most); }
 
   bool isDiagnosticsEnabled() const { return config_.diagnosticsEnabled; }
-  void setDiagnosticsEnabled(bool enabled) { config_.diagnosticsEnabled = enabled; }
+  void setDiagnosticsEnabled(bool enabled) {
+    inStep_.refuse("setDiagnosticsEnabled()");
+    config_.diagnosticsEnabled = enabled;
+  }
 
  protected:
   Settings() = default;

@@ -149,6 +149,9 @@ void SimulationConfig<Scalar>::validate() const {
       }
     }
   });
+  if (bodyCount >= std::numeric_limits<std::uint32_t>::max()) {
+    fault("bodyCount", std::to_string(bodyCount), "below 2^32 - 1");
+  }
   if (isFinite(minTimeStep) && isFinite(timeStep) && timeStep > Scalar(0) && minTimeStep > timeStep) {
     fault("minTimeStep", detail::formatReal(minTimeStep), "at most timeStep");
   }

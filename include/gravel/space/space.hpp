@@ -207,14 +207,14 @@ class Space : public Settings<Scalar> {
   void printProfilingReport() const { profiler_.print(stdout); }
   const Profiler& profiler() const { return profiler_; }
   /// Where diagnostics go, a line a call; standard output by default.
-  void setLog(Callback<void(const char*)> log) { log_ = std::move(log); }
+  void setLog(Callback<void(const char*)> log);
 
   /// Writes all that the next steps depend on, but for hooks and the log.
   /// \throws std::runtime_error if the file cannot be written
-  void save(const std::string& path) const;
+  void save(const std::string& path) const requires std::is_trivially_copyable_v<Scalar>;
   /// Takes up a saved run: the next steps give the bits that the saved space would have given. Hooks and
   /// the log stay those of this space. \throws std::runtime_error, std::invalid_argument: it stays as it was
-  void restore(const std::string& path);
+  void restore(const std::string& path) requires std::is_trivially_copyable_v<Scalar>;
 
   // Parts of the collision handling, as the step uses them.
 
@@ -297,7 +297,7 @@ class Space : public Settings<Scalar> {
   std::size_t steps_ = 0;
   EnergyLedger<Scalar> left_;  // the processes' part of the ledger
   bool ledgerOpen_ = false;    // bodies added before the first step belong to the start
-  Scalar lastTotalEnergy_ = std::numeric_limits<double>::infinity();
+  Scalar lastTotalEnergy_ = Scalar(std::numeric_limits<double>::infinity());
   Scalar hookPower_ = Scalar(0);
 
   OrbitStage<Scalar, Layout> orbits_;

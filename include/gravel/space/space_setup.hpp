@@ -143,6 +143,12 @@ void Space<Scalar, Layout>::setUniformField(const Vector& g) {
 }
 
 template <Real Scalar, class Layout>
+void Space<Scalar, Layout>::setLog(Callback<void(const char*)> log) {
+  this->inStep_.refuse("setLog()");
+  log_ = std::move(log);
+}
+
+template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::setForceHook(ForceHook<Scalar, Layout> hook) {
   this->inStep_.refuse("setForceHook()");
   force_.hook = std::move(hook);

@@ -123,7 +123,6 @@ void Space<Scalar, Layout>::logSystemEnergy(std::size_t iteration) {
     profiler_.skip(Phase::Diagnostics, "between two lines of the log");
     return;
   }
-  using std::abs;
   const Profiler::Scope scope(profiler_, Phase::Diagnostics);
   const EnergyLedger<Scalar> e = energyLedger();
   const Scalar total = e.total();
@@ -142,10 +141,11 @@ void Space<Scalar, Layout>::logSystemEnergy(std::size_t iteration) {
              " weight residual " + text(supportedWeight().residual()))
                 .c_str());
   }
-  const Scalar inPlay = e.kinetic + e.rotational + abs(e.potential);
+  const Scalar inPlay = e.kinetic + e.rotational + detail::sizeOf<Scalar>(e.potential);
   if (!isFinite(total)) {
     logLine("gravel: warning: the energy is not finite; the state cannot be trusted, take a shorter step");
-  } else if (isFinite(lastTotalEnergy_) && abs(total - lastTotalEnergy_) > inPlay / Scalar(10)) {
+  } else if (isFinite(lastTotalEnergy_) &&
+             detail::sizeOf<Scalar>(total - lastTotalEnergy_) > inPlay / Scalar(10)) {
     logLine(("gravel: warning: unstable: the energy ledger moved by " + text(total - lastTotalEnergy_) +
              " J since the last line, of " + text(inPlay) + " J in play; take a shorter step")
                 .c_str());
@@ -203,7 +203,8 @@ struct SpaceNumbers {
 }  // namespace detail
 
 template <Real Scalar, class Layout>
-void Space<Scalar, Layout>::save(const std::string& path) const {
+void Space<Scalar, Layout>::save(
+    const std::string& path) const requires std::is_trivially_copyable_v<Scalar> {
   SnapshotWriter out;
   forEachSetting(this->config_, [&](const Setting<Scalar>& setting, const auto& value) {
     if constexpr (std::is_same_v<std::remove_cvref_t<decltype(value)>, bool>) {
@@ -238,7 +239,7 @@ void Space<Scalar, Layout>::save(const std::string& path) const {
 }
 
 template <Real Scalar, class Layout>
-void Space<Scalar, Layout>::restore(const std::string& path) {
+void Space<Scalar, Layout>::restore(const std::string& path) requires std::is_trivially_copyable_v<Scalar> {
   this->inStep_.refuse("restore()");
   SnapshotReader in(path);
   SimulationConfig<Scalar> config;

@@ -15,6 +15,7 @@ class UniformGrid {
   /// point (which is what bounds memory where points lie far apart).
   template <class Positions>
   void build(const Positions& positions, S cell) {
+    detail::require("edge of a cell", cell, detail::positive<S>());
     const std::size_t n = positions.size();
     entries_.resize(n);
     start_.clear();

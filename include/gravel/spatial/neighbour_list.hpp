@@ -24,7 +24,7 @@ class NeighbourList {
   /// Pairs with |r_ij| < r_i + r_j + margin and some others, sorted by ids. O(N) while the last search holds.
   /// \param revision any number that changes whenever indices come to name other bodies
   /// \param margin [m] >= 0
-  /// \throws std::invalid_argument for positions or radii that are not finite, negative radii or margin
+  /// \throws std::invalid_argument for values that are not finite, negative radii or margin, unlike lengths
   /// \param travel  `travel(i)`: way [m] of body i while the list is to hold; `AtRest` for none
   /// \param h [s] that these ways take, for a sheared domain
   template <class Positions, class Radii, class Ids, class Travel = AtRest>
@@ -32,6 +32,7 @@ class NeighbourList {
                                   std::uint64_t revision, const Domain<S>& domain, const S& time,
                                   const S& margin = S(0), const Travel& travel = {}, const S& h = S(0)) {
     detail::require("margin of a neighbour list", margin, detail::nonNegative<S>());
+    detail::requireAsMany(positions.size(), radii.size(), ids.size());
     now_ = time;
     common_.shear(S(S(1.5) * domain.omega() * h));
     ++updates_;
@@ -59,7 +60,6 @@ class NeighbourList {
   }
 
   const std::vector<Pair>& pairs() const { return extra_.empty() ? pairs_ : joined_; }
-
   /// A body has taken another course since the update: appends to `out` the pairs that its new way adds to
   /// those of pairs(). O(1) while it stays in its half of the skin, else O(N).
   /// \param way [m] from positions[i]

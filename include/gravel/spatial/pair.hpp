@@ -36,6 +36,14 @@ struct Sphere {
   std::uint64_t id;
 };
 
+/// \throws std::invalid_argument unless all are as many as the positions
+inline void requireAsMany(std::size_t positions, std::size_t radii, std::size_t ids) {
+  if (radii != positions || ids != positions) {
+    refuse("length of radii and ids", std::to_string(radii) + " and " + std::to_string(ids),
+           "that of positions, " + std::to_string(positions));
+  }
+}
+
 /// Copies columns of any kind. \throws std::invalid_argument for a value that is not finite, a negative
 /// radius, columns of different lengths, and for 2^32 - 1 bodies or more
 template <Real S, class Positions, class Radii, class Ids>
@@ -45,10 +53,7 @@ void gatherSpheres(const Positions& positions, const Radii& radii, const Ids& id
   if (n >= std::numeric_limits<std::uint32_t>::max()) {
     refuse("number of bodies in a pair search", std::to_string(n), "below 2^32 - 1");
   }
-  if (radii.size() != n || ids.size() != n) {
-    refuse("length of radii and ids", std::to_string(radii.size()) + " and " + std::to_string(ids.size()),
-           "that of positions, " + std::to_string(n));
-  }
+  requireAsMany(n, radii.size(), ids.size());
   out.resize(n);
   parallelFor(n, 1024, [&](std::size_t i) {
     Sphere<S>& s = out[i];
