@@ -67,6 +67,14 @@ TEST_CASE("Two half steps of damping are one whole step, to rounding") {
   }
 }
 
+TEST_CASE("Damping refuses rates and times that are no numbers above zero") {
+  auto bodies = moving<double>(5);
+  const Vector3<double> v = bodies[4].velocity();
+  CHECK_THROWS_WITH(damp(bodies, 0.8, 0.3, std::nan("")), ContainsSubstring("damping is nan"));
+  CHECK_THROWS_WITH(damp(bodies, -0.8, 0.3, 1.0), ContainsSubstring("damping is -0.8"));
+  CHECK(Vector3<double>(bodies[4].velocity()) == v);
+}
+
 TEST_CASE("The energy that damping reports is the energy that is gone") {
   auto bodies = moving<double, AoSoA<8>>(5000);
   const double before = kinetic(bodies);

@@ -240,7 +240,7 @@ TEST_CASE(
 }
 
 // What comes down on a floor is braked by the air once, not as if the floor went on to push. Seen to fail:
-// blows are shown as contacts (a force of 2 k v, up).
+// blows are shown as contacts (3 m/s and 6.05 m/s).
 TEST_CASE("A user's force sees the velocity after a blow and not that of two") {
   for (const double e : {0.0, 0.5}) {
     SimulationConfig<double> config = plain(0.01);

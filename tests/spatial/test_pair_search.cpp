@@ -284,6 +284,9 @@ TEST_CASE("searches refuse what is no place or no radius, naming body and value"
     bad.radii.pop_back();
     CHECK_THROWS_WITH(find(bad, 0.0), ContainsSubstring("length of radii and ids is 199 and 200"));
     CHECK_THROWS_WITH(find(good, -1.0), ContainsSubstring("margin of a pair search is -1"));
+    const auto patch = Domain<double>::shearPeriodic({9, 9, 9}, 1.0);
+    CHECK_THROWS_WITH(method.findPairs(good.positions, good.radii, good.ids, 0.0, patch, std::nan(""), pairs),
+                      ContainsSubstring("time of a pair search is nan"));
     CHECK_NOTHROW(find(good, 0.0));  // a refusal leaves nothing broken
   }
 }

@@ -5,14 +5,19 @@
 /// No step is too long for it, and two half steps equal one step.
 
 #include <gravel/bodies/bodies.hpp>
+#include <gravel/core/check.hpp>
 #include <gravel/core/parallel.hpp>
 
 namespace gravel {
 
 /// Damps all bodies over a time h [s] at rates c, c_w [s^-1]. \return the energy taken out [J]
+/// \throws std::invalid_argument unless all three are finite, >= 0
 template <Real Scalar, class Layout>
 Scalar damp(Bodies<Scalar, Layout>& bodies, const Scalar& c, const Scalar& c_w, const Scalar& h) {
   using std::exp;
+  for (const Scalar& value : {c, c_w, h}) {
+    detail::require("rate or time of damping", value, detail::nonNegative<Scalar>());
+  }
   const Scalar f = exp(-c * h);
   const Scalar f_w = exp(-c_w * h);
   const Scalar half = Scalar(1) / Scalar(2);

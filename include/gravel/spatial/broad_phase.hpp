@@ -52,6 +52,9 @@ class BroadPhase {
   void findPairs(const Positions& positions, const Radii& radii, const Ids& ids, const S& margin,
                  const Domain<S>& domain, const S& time, std::vector<Pair>& out) {
     detail::require("margin of a pair search", margin, detail::nonNegative<S>());
+    if (!isFinite(time)) {
+      detail::refuse("time of a pair search", detail::formatReal(time), "finite");
+    }
     // Nothing is kept: some 200 bytes a body, for a search in many steps.
     std::vector<detail::Sphere<S>> spheres;
     detail::gatherSpheres(positions, radii, ids, domain, time, spheres);
