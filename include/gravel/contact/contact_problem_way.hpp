@@ -79,7 +79,11 @@ inline auto ContactProblem<S>::turningOf(const Taking<B>& taking, const Group& g
 
 template <Real S>
 inline void ContactProblem<S>::lookBackAt(const Group& group, detail::RowSlides<S>& slides) const {
-  if (!earlier.empty()) {
+  bool any = false;
+  for (std::size_t lane = 0; lane < group.count && !earlier.empty(); ++lane) {
+    any = any || marks[group.row[lane]].lasts;
+  }
+  if (any) {
     slides.slipBefore = vectorsOf([&](std::size_t lane) { return earlier[group.row[lane]].slip; });
     slides.turnBefore = vectorsOf([&](std::size_t lane) { return earlier[group.row[lane]].turn; });
   }
@@ -112,6 +116,7 @@ void ContactProblem<S>::lookBack(const Taking<B>& taking, const Group& group, co
           speedIn(Vector3<S>(taking.way.kick * (a(group.slot2[lane]) - a(group.slot1[lane]))));
       earlier[k].slip = slip.at(lane) + aimed.at(lane) - (kick - n.dot(kick) * n);
       rests_[k] = RowRest::Not;
+      marks[k].lasts = true;
     }
   }
   if (turning.empty()) {
@@ -127,6 +132,7 @@ void ContactProblem<S>::lookBack(const Taking<B>& taking, const Group& group, co
     if (rolls[lane] && !marks[k].impact) {
       earlier[k].turn = turn.at(lane);
       rests_[k] = RowRest::Not;
+      marks[k].lasts = true;
     }
   }
 }

@@ -114,6 +114,7 @@ struct RowMark {
   bool taken = false;    ///< its impulse is in the list of this problem; if not, it is that of the last one
   bool atLimit = false;  ///< its friction was cut when last looked at
   bool kinetic = false;  ///< it slides: what cuts it is kinetic friction
+  bool lasts = false;    ///< it has a RowBefore
   std::uint8_t slides = 0;  ///< how often it began to slide, `patience` at most: then it goes on
   static constexpr std::uint8_t patience = 8;
 };
