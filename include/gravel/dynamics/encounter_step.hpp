@@ -180,10 +180,6 @@ void lookAtLikeliest(const Bodies<Scalar, Layout>& bodies, const Domain<Scalar>&
   });
 }
 
-}  // namespace detail
-
-namespace detail {
-
 /// See unlikeMasses. O(N).
 template <class S, class BodiesType>
 bool haveUnlikeMasses(const BodiesType& bodies) {
@@ -205,8 +201,9 @@ bool haveUnlikeMasses(const BodiesType& bodies) {
 /// deeper than a quarter of the smaller radius in a step. Up to `encounterPairs` bodies O(N^2), about as dear
 /// as their gravity. Above O(N), or O(N log N) where masses are unlike; there it is enough, too, if no sphere
 /// moves by more than a quarter of its radius, relative to the common centre of mass, and only where that
-/// asks for a shorter step pairs are searched, in O(N log N). \param domain unless open, pairs are nearest
-/// through images: above the likeliest partner is meant for any
+/// asks for a shorter step pairs are searched, in O(N log N).
+///
+/// \param domain unless open, pairs are nearest through images: above, the likeliest partner is meant for any
 ///        masses, and for any number no sphere moves by more than a quarter of its radius, the flow left out
 ///        as in adaptive_step.hpp
 /// \param time [s] for a domain that shears
