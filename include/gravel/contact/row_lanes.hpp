@@ -198,7 +198,10 @@ template <Real S>
                                                           const PackedVector<S>& before) {
   using P = Packed<S>;
   const P along = -wanted.dot(before);
-  const P cosine_sq = along * along * reciprocalOf(wanted.squaredNorm() * before.squaredNorm());
+  const auto over = [&along](const PackedVector<S>& v) {  // v^2, in the range of numbers
+    return along * reciprocalOf(largerOf(v.squaredNorm(), P::all(std::numeric_limits<S>::min())));
+  };
+  const P cosine_sq = over(wanted) * over(before);
   return wanted - (mass * choose(along > P::zero(), cosine_sq, P::zero())) * before;
 }
 
