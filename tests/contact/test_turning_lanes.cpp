@@ -402,8 +402,8 @@ TEMPLATE_TEST_CASE("rows that slid and turned before are held against the mean o
   }
 }
 
-// Seen to fail: the product of both squares, whose inverse leaves the range (not a number, for float from
-// 1e-10 on).
+// Seen to fail: the product of both squares, whose inverse leaves the range of
+// numbers.
 TEMPLATE_TEST_CASE("a slide is held against the mean of both slips however slow it is", "",
                    GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
