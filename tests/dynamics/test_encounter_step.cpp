@@ -241,7 +241,7 @@ TEST_CASE("Tracers leave the likeliest partner what it is") {
 }
 
 // Two that are each other's nearest across an edge; in the patch the image has been sheared, and moves on.
-// Seen to fail: the likeliest partner for any number (5 to 150 times the step), distances without images, the
+// Seen to fail: the likeliest partner for any number (the longest step), distances without images, the
 // speed of the sheared image left out.
 TEST_CASE("Up to the limit pairs are nearest through the images of a domain") {
   const double omega = 0.3;
