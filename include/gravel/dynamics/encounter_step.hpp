@@ -25,7 +25,7 @@ namespace gravel {
 /// closer than touching.
 inline constexpr std::size_t encounterPairs = 128;
 
-/// Masses are unlike from a body on that has more than so many times their mean, tracers aside.
+/// Masses are unlike if one body has more than so many times the mean of the others, tracers aside.
 inline constexpr double unlikeMasses = 4;
 
 namespace detail {
@@ -183,16 +183,16 @@ void lookAtLikeliest(const Bodies<Scalar, Layout>& bodies, const Domain<Scalar>&
 /// See unlikeMasses. O(N).
 template <class S, class BodiesType>
 bool haveUnlikeMasses(const BodiesType& bodies) {
-  S sum(0);
   S heaviest(0);
+  S others(0);
   std::size_t massive = 0;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const S m = S(bodies.masses()[i]);
-    sum += m;
+    others += std::min<S>(m, heaviest);
     heaviest = std::max<S>(heaviest, m);
     massive += m > S(0) ? 1U : 0U;
   }
-  return S(static_cast<double>(massive)) * heaviest > S(unlikeMasses) * sum;
+  return massive > 1 && S(static_cast<double>(massive - 1)) * heaviest > S(unlikeMasses) * others;
 }
 
 }  // namespace detail

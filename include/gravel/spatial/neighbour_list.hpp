@@ -60,6 +60,7 @@ class NeighbourList {
   }
 
   const std::vector<Pair>& pairs() const { return extra_.empty() ? pairs_ : joined_; }
+
   /// A body has taken another course since the update: appends to `out` the pairs that its new way adds to
   /// those of pairs(). O(1) while it stays in its half of the skin, else O(N).
   /// \param way [m] from positions[i]
@@ -98,7 +99,6 @@ class NeighbourList {
   bool strays() const { return strays_ || !swift_.empty() || !common_.isNone(); }
   /// Whether the last update searched.
   bool rebuilt() const { return rebuilt_; }
-  /// Searches made so far.
   std::uint64_t searches() const { return searches_; }
   /// Why the last update searched, or why it did not.
   const char* reason() const {
