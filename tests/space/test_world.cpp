@@ -164,7 +164,7 @@ double springError(double dt, double drag, double* worked = nullptr) {
 
 }  // namespace
 
-// The work entry is a trapezium sum of F.v over the steps: second order, both sides.
+// The work entry is a trapezium sum over the steps: second order, both sides.
 TEST_CASE("The work of a user's force is booked, to the second order of the step") {
   double worked = 0;
   const double coarse = springError(4e-3, 0.0);

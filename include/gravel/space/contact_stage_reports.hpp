@@ -8,7 +8,7 @@
 namespace gravel {
 
 /// What changes velocities between drift and kick changes the kick's work by F.dv kick, for which no drift
-/// takes anything out of the potential (what a hook does is booked from the velocities as they are). Of two
+/// takes anything out of the potential (a hook does its work on the way of drifts alone: HookWork). Of two
 /// movable spheres these cancel in a uniform field; a fixed one takes its part away.
 template <Real Scalar, class Layout>
 Scalar ContactStage<Scalar, Layout>::separationWork(const ForceStage<Scalar, Layout>& force,
@@ -38,8 +38,7 @@ Scalar ContactStage<Scalar, Layout>::separationWork(const ForceStage<Scalar, Lay
 /// do the work m a.(v before + v after) kick/2, and the drift takes it out of the potential at the velocity
 /// in between. What J changes in the drift and in all later kicks, but not in the first one, leaves
 /// -J.a kick: with it booked, what rests or rolls loses nothing over a step, to rounding, and the ledger
-/// closes to the order of the integrator. So with a hook's force: its work, the mean of its power at both
-/// ends, differs by terms that cancel from step to step.
+/// closes to the order of the integrator. So with a hook's force (HookWork).
 template <Real Scalar, class Layout>
 void ContactStage<Scalar, Layout>::bookKick(const Bodies& bodies, const Scalar& kick) {
   const Eigen::Array<Scalar, 2, 1> losses = solver_.workOn([&](std::uint32_t i) {

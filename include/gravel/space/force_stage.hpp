@@ -9,6 +9,7 @@
 #include <gravel/dynamics/integrator.hpp>
 #include <gravel/gravity/gravity_solver.hpp>
 #include <gravel/output/energy_ledger.hpp>
+#include <gravel/space/hook_work.hpp>
 
 #include <span>
 #include <vector>
@@ -53,6 +54,7 @@ class ForceStage {
   Vector3<Scalar> field = Vector3<Scalar>::Zero();  ///< [m s^-2], acts on movable bodies
   ForceHook<Scalar, Layout> hook;
   GravitySolver<Scalar> gravity;
+  HookWork<Scalar, Layout> hookWork;
   ContactKicks<Scalar> contactKicks;  ///< where there is a hook, until the next evaluation; empty for none
 
   bool hasTorques() const { return static_cast<bool>(hook); }
@@ -119,23 +121,6 @@ class ForceStage {
     return energy;
   }
 
-  /// Power of the user's force at the present velocities [W]; zero without a hook.
-  Scalar hookPower(const Bodies<Scalar, Layout>& bodies) const {
-    Scalar power(0);
-    for (std::size_t i = 0; hook && i < hookForces_.size() && i < bodies.size(); ++i) {
-      const auto body = bodies[i];
-      if (!body.isFixed()) {
-        if (body.inverseMass() > Scalar(0)) {
-          power += hookForces_[i].dot(Vector3<Scalar>(body.velocity()));
-        }
-        if (body.inverseInertia() > Scalar(0)) {
-          power += Vector3<Scalar>(body.torque()).dot(Vector3<Scalar>(body.angularVelocity()));
-        }
-      }
-    }
-    return power;
-  }
-
   /// Force of gravity and field on body i, without the user's own [N].
   Vector3<Scalar> conservativeForce(const Bodies<Scalar, Layout>& bodies, std::size_t i) const {
     Vector3<Scalar> force = bodies.forces()[i];
@@ -145,7 +130,10 @@ class ForceStage {
     return force;
   }
 
-  /// What the hook gave to the present forces, three numbers a body; empty without one, and if it was asked
+  /// What the hook gave to the present forces [N], by body; empty without one.
+  std::span<const Vector3<Scalar>> hookForces() const { return hookForces_; }
+
+  /// The same, three numbers a body; empty without one, and if it was asked
   /// for other bodies than these n. For a restart.
   std::vector<Scalar> hookParts(std::size_t n) const {
     std::vector<Scalar> parts;

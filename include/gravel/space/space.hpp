@@ -298,7 +298,6 @@ class Space : public Settings<Scalar> {
   EnergyLedger<Scalar> left_;  // the processes' part of the ledger
   bool ledgerOpen_ = false;    // bodies added before the first step belong to the start
   Scalar lastTotalEnergy_ = Scalar(std::numeric_limits<double>::infinity());
-  Scalar hookPower_ = Scalar(0);
 
   OrbitStage<Scalar, Layout> orbits_;
   PileStep<Scalar> piles_;

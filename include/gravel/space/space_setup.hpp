@@ -157,7 +157,6 @@ void Space<Scalar, Layout>::setForceHook(ForceHook<Scalar, Layout> hook) {
     bodies_[i].torque() = Vector::Zero().eval();
     bodies_[i].angularAcceleration() = Vector::Zero().eval();
   }
-  hookPower_ = Scalar(0);
   forcesValid_ = false;
 }
 

@@ -158,7 +158,7 @@ namespace detail {
 /// The space's own numbers in a snapshot, in one order for writing and reading.
 template <Real Scalar>
 struct SpaceNumbers {
-  Scalar dt, previous_dt, time, timeRest, lastTotalEnergy, hookPower;
+  Scalar dt, previous_dt, time, timeRest, lastTotalEnergy;
   EnergyLedger<Scalar> left;
   Vector3<Scalar> field;
   std::uint64_t steps, nextId;
@@ -172,7 +172,6 @@ struct SpaceNumbers {
     visit("time", time);
     visit("timeRest", timeRest);
     visit("lastTotalEnergy", lastTotalEnergy);
-    visit("hookPower", hookPower);
     visit("left", left);
     visit("field.x", field[0]);
     visit("field.y", field[1]);
@@ -219,7 +218,6 @@ void Space<Scalar, Layout>::save(
       time_,
       timeRest_,
       lastTotalEnergy_,
-      hookPower_,
       left_,
       force_.field,
       steps_,
@@ -285,7 +283,6 @@ void Space<Scalar, Layout>::restore(const std::string& path) requires std::is_tr
   time_ = numbers.time;
   timeRest_ = numbers.timeRest;
   lastTotalEnergy_ = numbers.lastTotalEnergy;
-  hookPower_ = numbers.hookPower;
   left_ = numbers.left;
   steps_ = static_cast<std::size_t>(numbers.steps);
   ledgerOpen_ = numbers.ledgerOpen != 0;

@@ -103,9 +103,6 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration, const Sc
     if (this->config_.sleepSpeed > Scalar(0)) {
       sleep_.watch(bodies_, contact_, this->config_, h);
     }
-    if (force_.hook) {
-      hookPower_ = force_.hookPower(bodies_);
-    }
   } else {
     previous_dt_ = h;
     profiler_.skip(Phase::Integration, "no bodies");
@@ -139,7 +136,6 @@ void Space<Scalar, Layout>::prepare() {
     applyGravity();
     buildCollisionGraph();
     rememberPlaces();
-    hookPower_ = force_.hookPower(bodies_);
     stepGoesOn_ = false;
     updateAdaptiveTimeStep();
     const std::vector<std::pair<BodyId, BodyId>> merges = decideTouching();

@@ -152,6 +152,13 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
       kick(late);
     }
   };
+  const bool works = static_cast<bool>(force_.hook);
+  if (works) {
+    if (part == 0 || apart) {
+      force_.hookWork.begin(bodies_, force_.hookForces());
+    }
+    force_.hookWork.depart(bodies_);
+  }
   const char* const alone = contact_.reasonToSkip(bodies_);
   const bool quiet = hasSeveralDrifts() && !apart;
   const Departure departure{this,
@@ -164,6 +171,9 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
     profiler_.skip(Phase::Impacts, alone);
   }
   const auto arrival = [&] {
+    if (works) {
+      force_.hookWork.arrive(bodies_, contact_dt_);
+    }
     contact_.boundaries.advance(contact_dt_, halves(2 * part + 1));
     left_.work -= contact_.wrap(bodies_, Scalar(time_ + end), force_.field);
     contact_.detect(bodies_, this->config_, Scalar(time_ + end), contact_dt_, true, profiler_);
@@ -173,6 +183,9 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
     const Profiler::Scope scope(profiler_, Phase::Integration);
     if (orbits_.moves(this->config_.integrator)) {
       orbits_.advance(this->config_, bodies_, h, force_, forces);
+      if (works) {
+        force_.hookWork.arrive(bodies_, h);
+      }
     } else if (frame.turns()) {
       integrateEpicycle(frame, bodies_, contact_dt_, torques, forces, arrival, departure);
     } else {
@@ -188,20 +201,20 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
   const std::vector<std::pair<BodyId, BodyId>> merges = decideCollisions(Scalar(time_ + end));
   contact_.drivePlanes(halves(2 * part + 2));
   resolveCollisions();
-  if (force_.hook && !held) {
-    const Scalar power = force_.hookPower(bodies_);
-    left_.work -= (hookPower_ + power) * (apart ? contact_dt_ : h) / Scalar(2);
+  const bool anew = !last && !merges.empty();  // forces are found once more
+  if (works && (!held || anew)) {
+    left_.work -= force_.hookWork.end(bodies_, force_.hookForces());
   }
   contact_.endPart(start, last);
   forcesValid_ = true;
   mergeCollided(merges, Scalar(time_ + end));
-  if (!last && !merges.empty()) {
+  if (anew) {
     contact_.endMerged(bodies_, merges);
     force_.evaluate(bodies_, getG(), this->config_.softening, contact_.domain, Scalar(time_ + end),
                     profiler_);
-  }
-  if (force_.hook && apart) {
-    hookPower_ = force_.hookPower(bodies_);
+    if (works) {
+      force_.hookWork.begin(bodies_, force_.hookForces());
+    }
   }
 }
 
