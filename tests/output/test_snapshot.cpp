@@ -3,8 +3,13 @@
 #include <gravel/core/random.hpp>
 #include <gravel/output/snapshot.hpp>
 
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <cstring>
 #include <limits>
+#include <string>
 
 using namespace gravel;
 using namespace gravel::test;
@@ -152,8 +157,35 @@ TEST_CASE("What is no snapshot, or not there, or cannot be written, is told by i
   CHECK_THROWS_WITH(SnapshotReader(file.path()),
                     ContainsSubstring(file.path()) && ContainsSubstring("not a snapshot"));
   CHECK_THROWS_WITH(SnapshotReader("/nowhere/at/all"), ContainsSubstring("/nowhere/at/all"));
+  const std::string folder = std::filesystem::temp_directory_path().string();
+  CHECK_THROWS_WITH(SnapshotReader(folder), ContainsSubstring(folder) && ContainsSubstring("cannot be read"));
   SnapshotWriter out;
-  CHECK_THROWS_WITH(out.write("/nowhere/at/all"), ContainsSubstring("/nowhere/at/all"));
+  CHECK_THROWS_WITH(out.write("/nowhere/at/all"),
+                    "gravel: cannot write /nowhere/at/all: No such file or directory");
+}
+
+// Seen to fail: the link itself replaced by a file.
+TEST_CASE("A file is written through links to where they lead, and into what is no file, as a pipe") {
+  const TemporaryFile file("target");
+  file.put({'o', 'l', 'd'});
+  const TemporaryFile link("link");
+  std::filesystem::create_symlink(file.path(), link.path());
+  SnapshotWriter out;
+  out.value("x", 1.5);
+  out.write(link.path());
+  CHECK(std::filesystem::is_symlink(link.path()));
+  CHECK(SnapshotReader(file.path()).value<double>("x") == 1.5);
+
+  const TemporaryFile pipe("pipe");
+  REQUIRE(mkfifo(pipe.path().c_str(), 0600) == 0);
+  const int reader = open(pipe.path().c_str(), O_RDONLY | O_NONBLOCK);  // first: a writer waits for one
+  REQUIRE(reader >= 0);
+  detail::writeFileWhole(pipe.path(), "through");
+  char read[16] = {};
+  CHECK(::read(reader, read, sizeof read) == 7);
+  close(reader);
+  CHECK(std::string(read) == "through");
+  CHECK(std::filesystem::is_fifo(pipe.path()));
 }
 
 TEST_CASE("A failed write leaves the file before it as it was, and no part behind") {
@@ -164,6 +196,7 @@ TEST_CASE("A failed write leaves the file before it as it was, and no part behin
   SnapshotWriter out;
   out.value("x", 1.0);
   CHECK_THROWS_AS(out.write(file.path()), std::runtime_error);
+  CHECK(std::filesystem::is_directory(file.path() + ".part"));
   CHECK(file.bytes() == std::vector<char>{'o', 'l', 'd'});
   std::filesystem::remove(file.path() + ".part");
 }

@@ -8,6 +8,7 @@
 /// are in the machine's own form, so a file is read on the same kind of machine; anything else is refused.
 
 #include <gravel/bodies/bodies.hpp>
+#include <gravel/output/whole_file.hpp>
 
 #include <algorithm>
 #include <cstdio>
@@ -49,19 +50,12 @@ class SnapshotWriter {
     array(name, &x, 1);
   }
 
-  /// Writes beside the target first and renames: the target is whole or as it was.
-  /// \throws std::runtime_error if the file cannot be written
+  /// The file is whole or as it was; see writeFileWhole().
+  /// \throws std::runtime_error with path and reason if the file cannot be written
   void write(const std::string& path) {
     const std::uint64_t sum = detail::fnv1a(detail::fnvStart, bytes_.data(), bytes_.size());
     raw(&sum, sizeof sum);
-    const std::string part = path + ".part";
-    std::FILE* file = std::fopen(part.c_str(), "wb");
-    bool good = file != nullptr && std::fwrite(bytes_.data(), 1, bytes_.size(), file) == bytes_.size();
-    good = file != nullptr && std::fclose(file) == 0 && good;
-    if (!good || std::rename(part.c_str(), path.c_str()) != 0) {
-      std::remove(part.c_str());
-      throw std::runtime_error("gravel: cannot write the snapshot " + path);
-    }
+    detail::writeFileWhole(path, {reinterpret_cast<const char*>(bytes_.data()), bytes_.size()});
   }
 
  private:
@@ -89,7 +83,11 @@ class SnapshotReader {
     for (std::size_t n = 0; (n = std::fread(block, 1, sizeof block, file)) > 0;) {
       bytes_.insert(bytes_.end(), block, block + n);
     }
+    const bool whole = std::ferror(file) == 0;
     std::fclose(file);
+    if (!whole) {
+      fail("cannot be read");
+    }
     const std::size_t magic = sizeof detail::snapshotMagic - 1;
     if (bytes_.size() < magic + sizeof(std::uint64_t) ||
         std::memcmp(bytes_.data(), detail::snapshotMagic, magic) != 0) {

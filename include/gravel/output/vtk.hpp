@@ -5,9 +5,9 @@
 /// `.pvd` file that gives each frame its time. Format: VTK User's Guide, "VTK File Formats", XML formats.
 
 #include <gravel/bodies/bodies.hpp>
+#include <gravel/output/whole_file.hpp>
 
 #include <bit>
-#include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -21,43 +21,6 @@
 namespace gravel {
 
 namespace detail {
-
-[[noreturn]] inline void refuseFile(const std::filesystem::path& path, const std::string& why) {
-  throw std::runtime_error("gravel: cannot write " + path.string() + ": " + why);
-}
-
-/// Writes a whole file beside its place and moves it there, so that a reader never sees half of one.
-/// \throws std::runtime_error with path and reason; then nothing is left behind
-inline void writeFileWhole(const std::filesystem::path& path, std::string_view head,
-                           std::string_view data = {}, std::string_view tail = {}) {
-  const std::filesystem::path partial = path.string() + ".part";
-  const auto fail = [&](int error) {
-    std::error_code ignored;
-    std::filesystem::remove(partial, ignored);
-    refuseFile(path, std::generic_category().message(error));
-  };
-  std::FILE* file = std::fopen(partial.string().c_str(), "wb");
-  if (file == nullptr) {
-    fail(errno);
-  }
-  int error = 0;
-  for (const std::string_view part : {head, data, tail}) {
-    if (error == 0 && std::fwrite(part.data(), 1, part.size(), file) != part.size()) {
-      error = errno;
-    }
-  }
-  if (std::fclose(file) != 0 && error == 0) {
-    error = errno;
-  }
-  if (error != 0) {
-    fail(error);
-  }
-  std::error_code moved;
-  std::filesystem::rename(partial, path, moved);
-  if (moved) {
-    fail(moved.value());
-  }
-}
 
 /// What stands in a file for a scalar: float for float, double for every other real type.
 template <class T>
