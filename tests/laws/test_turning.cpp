@@ -113,6 +113,49 @@ TEST_CASE("Spheres that turn as one, with friction, keep their shape and energy 
   }
 }
 
+// Three unequal spheres that touch turn about their centre of mass as one, held by N_ij = m_i m_j (G/d^2 -
+// w^2 d/M) alone. The first step, without a solve before it, leaves gaps of the order (h w)^3; no other adds
+// to them. Seen to fail: v_t with the share of the kick that others undo (-3e-2, -7.5e-3 after five turns,
+// second order, ever growing).
+TEST_CASE("Three unequal spheres that turn as one neither part nor drift into each other") {
+  const std::vector<double> masses{3, 1, 0.4};
+  const std::vector<double> radii{1.2, 0.9, 0.6};
+  const auto distance = [&](std::size_t i, std::size_t j) { return radii[i] + radii[j]; };
+  const double d_01 = distance(0, 1);
+  const double d_02 = distance(0, 2);
+  const double x = (d_01 * d_01 + d_02 * d_02 - distance(1, 2) * distance(1, 2)) / (2 * d_01);
+  const std::vector<Vec> places{{0, 0, 0}, {d_01, 0, 0}, {x, std::sqrt(d_02 * d_02 - x * x), 0}};
+  const Vec centre = (3 * places[0] + places[1] + 0.4 * places[2]) / 4.4;
+  const double w = 0.5 * std::sqrt(4.4 / (d_01 * d_01 * d_01));
+  for (const double friction : {0.0, 1.0}) {
+    for (const double steps : {200.0, 400.0}) {  // a turn
+      const double phi = 2 * pi<double>() / steps;
+      SimulationConfig<double> config = sticky(phi / w, friction);
+      config.positionalCorrectionFactor = 0;
+      config.contactTolerance = 1e-10;
+      Space<double> space(config);
+      for (std::size_t i = 0; i < 3; ++i) {
+        const Vec at = places[i] - centre;
+        space.addBody(ball(at, w * Vec::UnitZ().cross(at), radii[i], masses[i], {0, 0, w}));
+      }
+      const auto gap = [&](std::size_t i, std::size_t j) {
+        return (Vec(space.body(j).position()) - Vec(space.body(i).position())).norm() / distance(i, j) - 1;
+      };
+      const auto widest = [&] {
+        return std::max({std::abs(gap(0, 1)), std::abs(gap(0, 2)), std::abs(gap(1, 2))});
+      };
+      const double energy = space.energyLedger().mechanical();
+      space.advanceTo(2 * pi<double>() / w);
+      const double once = widest();
+      space.advanceTo(10 * pi<double>() / w);
+      CAPTURE(friction, steps, once, widest());
+      CHECK(widest() < 2 * phi * phi * phi);
+      CHECK_THAT(widest(), WithinRel(once, 1e-4));
+      CHECK(std::abs(space.energyLedger().mechanical() - energy) < phi * phi * phi);  // of 1.3
+    }
+  }
+}
+
 // Who falls with the packing sees no field (Einstein's lift). What a turn adds was compared with
 // accelerations as they are, of which the common fall held nothing together: from 100 times the packing's own
 // gravity on its turn seemed to be little, and it grew as without what is said above. The last field is a

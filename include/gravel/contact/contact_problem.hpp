@@ -255,11 +255,13 @@ class ContactProblem : public detail::ProblemBodies<S> {
   [[gnu::always_inline]] inline detail::PackedVector<S> driftsOf(const Taking<B>& taking,
                                                                  const Group& group) const;
 
-  /// \param b1,b2 as in aim() \param v relative velocity, with drifts
+  /// \param b1,b2 as in aim(); for the drift with what the last impulses did, if the problem is the same
   template <class B>
-  [[gnu::always_inline]] inline detail::TurningPair<S> turningOf(
-      const Taking<B>& taking, const Group& group, const Lanes& row, const detail::BodyLanes<S>& b1,
-      const detail::BodyLanes<S>& b2, const detail::PackedVector<S>& v, const Pack& v_n) const;
+  [[gnu::always_inline]] inline detail::TurningPair<S> turningOf(const Taking<B>& taking, const Group& group,
+                                                                 const Lanes& row,
+                                                                 const detail::BodyLanes<S>& b1,
+                                                                 const detail::BodyLanes<S>& b2,
+                                                                 const detail::PackedVector<S>& drifts) const;
 
   /// Takes down how rows slipped and turned before, of those that last.
   /// \param b1,b2 as in aim() \param v_n without drifts \param aimed  slip that is left to the way ahead

@@ -180,7 +180,7 @@ inline S ContactProblem<S>::aim(const Taking<B>& taking, const Group& group, Lan
   const Pack drift = row.n.dot(drifts);
   const Pack v_n = present + drift;
   const Pack speed = sizeOf(v_n);
-  const detail::TurningPair<S> turned = turningOf(taking, group, row, b1, b2, v_rel + drifts, v_n);
+  const detail::TurningPair<S> turned = turningOf(taking, group, row, b1, b2, drifts);
   const bool bends = taking.way.follows && !taking.way.bend.empty();
   detail::PackedVector<S> slip = detail::PackedVector<S>::zero();
   if (taking.way.follows) {

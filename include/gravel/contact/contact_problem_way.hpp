@@ -66,15 +66,28 @@ template <Real S>
 template <class B>
 inline auto ContactProblem<S>::turningOf(const Taking<B>& taking, const Group& group, const Lanes& row,
                                          const detail::BodyLanes<S>& b1, const detail::BodyLanes<S>& b2,
-                                         const detail::PackedVector<S>& v, const Pack& v_n) const
+                                         const detail::PackedVector<S>& drifts) const
     -> detail::TurningPair<S> {
+  using Turning = detail::TurningPair<S>;
   const Pack boundary = Pack::of(
       [&](std::size_t lane) { return S(group.slot2[lane] == taking.colouring.staticSlot() ? 1 : 0); });
-  const detail::PackedVector<S> w =
-      friction ? row.c1 * b1.s + row.c2 * b2.s : detail::PackedVector<S>::zero();
-  return detail::TurningPair<S>::of(!(boundary > Pack::zero()), row.n, row.c1 * b1.spin + row.c2 * b2.spin,
-                                    largerOf(v.squaredNorm() - v_n * v_n, Pack::zero()), w,
-                                    b1.inverseMass + b2.inverseMass, taking.dt, speedExponent_);
+  const auto with = [&](const detail::BodyLanes<S>& m1, const detail::BodyLanes<S>& m2) {
+    const detail::PackedVector<S> v = m2.v - m1.v + drifts;
+    const Pack v_n = row.n.dot(v);
+    const detail::PackedVector<S> w =
+        friction ? row.c1 * m1.s + row.c2 * m2.s : detail::PackedVector<S>::zero();
+    return Turning::of(!(boundary > Pack::zero()), row.n, row.c1 * b1.spin + row.c2 * b2.spin,
+                       largerOf(v.squaredNorm() - v_n * v_n, Pack::zero()), w,
+                       b1.inverseMass + b2.inverseMass, taking.dt, speedExponent_);
+  };
+  const Turning before = with(b1, b2);
+  if (!(again && taking.way.follows && before.counts.any())) {
+    return before;
+  }
+  const Turning after =
+      with(detail::BodyLanes<S>::load(bodies, group.slot1), detail::BodyLanes<S>::load(bodies, group.slot2));
+  return {choose(before.counts, after.approach, before.approach),
+          choose(before.counts, after.slip, before.slip), before.counts};
 }
 
 template <Real S>

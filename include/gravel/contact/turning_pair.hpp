@@ -12,8 +12,11 @@
 ///   w x n + h/(2 D) w x (w x n),
 /// has the part h/(2 D) (w.n) w_t across n, which is the slip of the tangent at the start. Without either,
 /// aggregates that turn as one grew by (h omega)^2/2 in every step, and friction held what should close
-/// again. A half-space does not turn. Below a small share of the accelerations both fade, as restitution does
-/// at low speeds: with them a ball that rocks in the hollow of a heap loses nothing, and goes on for ever.
+/// again. Both take the velocities of the drift, after all impulses, and those of the solve before foretell
+/// them: of what a kick adds across n, other contacts may undo all (three unequal spheres that turn as one
+/// drifted into each other with h a_t/2 in v_t). A half-space does not turn. Below a small share of the
+/// accelerations both fade, as restitution does at low speeds: with them a ball that rocks in the hollow of a
+/// heap loses nothing, and goes on for ever.
 
 #include <gravel/contact/row_lanes.hpp>
 
