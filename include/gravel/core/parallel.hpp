@@ -38,6 +38,18 @@ namespace detail {
 /// and wait for them where cores have other work, which takes a hundred times as long.
 inline constexpr std::size_t fewTasks = 8;
 
+/// The one copy of a task's code, whoever calls it: in two of them a compiler could fuse products with sums
+/// in other places, and bits would depend on the number of threads.
+template <class F>
+#if defined(__GNUC__) && !defined(__clang__)
+[[gnu::noinline, gnu::noclone]]
+#else
+[[gnu::noinline]]
+#endif
+void callTask(F& f, std::size_t task) {
+  f(task);
+}
+
 /// Keeps the exception of the lowest chunk that threw.
 class FirstError {
  public:
@@ -160,7 +172,7 @@ template <Share share = Share::AsFree, class F>
 void parallelForTasks(std::size_t count, F&& f) {
   if (count < (share == Share::Alike ? detail::fewTasks : 2) || threadCount() == 1) {
     for (std::size_t c = 0; c < count; ++c) {
-      f(c);
+      detail::callTask(f, c);
     }
     return;
   }
@@ -169,7 +181,7 @@ void parallelForTasks(std::size_t count, F&& f) {
   const auto last = static_cast<std::ptrdiff_t>(count);
   const auto call = [&](std::ptrdiff_t c) {
     try {
-      f(static_cast<std::size_t>(c));
+      detail::callTask(f, static_cast<std::size_t>(c));
     } catch (...) {
       error.keep(static_cast<std::size_t>(c), std::current_exception());
     }
