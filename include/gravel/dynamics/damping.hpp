@@ -2,18 +2,21 @@
 
 /// \file
 /// Drag in proportion to velocity, dv/dt = -c v and dw/dt = -c_w w, solved exactly: v(t+h) = v(t) exp(-c h).
-/// No step is too long for it, and two half steps equal one step.
+/// No step is too long for it, and two half steps equal one step. In a domain that shears v is that less the
+/// flow, -(3/2) Omega x along y: any other damping would tell an image from its body.
 
 #include <gravel/bodies/bodies.hpp>
 #include <gravel/core/check.hpp>
 #include <gravel/core/parallel.hpp>
+#include <gravel/spatial/domain.hpp>
 
 namespace gravel {
 
 /// Damps all bodies over a time h [s] at rates c, c_w [s^-1]. \return the energy taken out [J]
 /// \throws std::invalid_argument unless all three are finite, >= 0
 template <Real Scalar, class Layout>
-Scalar damp(Bodies<Scalar, Layout>& bodies, const Scalar& c, const Scalar& c_w, const Scalar& h) {
+Scalar damp(Bodies<Scalar, Layout>& bodies, const Scalar& c, const Scalar& c_w, const Scalar& h,
+            const Domain<Scalar>& domain = {}) {
   using std::exp;
   for (const Scalar& value : {c, c_w, h}) {
     detail::require("rate or time of damping", value, detail::nonNegative<Scalar>());
@@ -30,7 +33,11 @@ Scalar damp(Bodies<Scalar, Layout>& bodies, const Scalar& c, const Scalar& c_w, 
       }
       const Scalar v_sq = body.velocity().squaredNorm();
       const Scalar w_sq = body.angularVelocity().squaredNorm();
-      body.velocity() *= f;
+      if (!(f == Scalar(1))) {
+        const Vector3<Scalar> v = body.velocity();
+        const Vector3<Scalar> u = domain.lessFlow(body.position(), v);
+        body.velocity() = Vector3<Scalar>(v - u) + f * u;
+      }
       body.angularVelocity() *= f_w;
       lost += half * (Scalar(body.mass()) * (v_sq - Scalar(body.velocity().squaredNorm())) +
                       body.inertia() * (w_sq - Scalar(body.angularVelocity().squaredNorm())));

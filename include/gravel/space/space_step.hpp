@@ -196,7 +196,7 @@ void Space<Scalar, Layout>::applyDamping() {
     return;
   }
   const Profiler::Scope scope(profiler_, Phase::Damping);
-  left_.damping += damp(bodies_, c.linearDamping, c.angularDamping, previous_dt_);
+  left_.damping += damp(bodies_, c.linearDamping, c.angularDamping, previous_dt_, contact_.domain);
 }
 
 template <Real Scalar, class Layout>
