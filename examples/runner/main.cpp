@@ -129,6 +129,24 @@ class Schedule {
   double duration_, interval_;
 };
 
+/// Makes one step, or what is left of one until `end`, so that each can be looked at. Which one an adaptive
+/// run begins with, the space finds when it makes it: until then it says the longest that is allowed, and
+/// that is no longer than the run.
+void stepTowards(Space<double>& space, double end) {
+  const double rest = end - space.time();
+  const bool isChosenLater =
+      space.steps() == 0 && space.config().adaptiveTimeStep && space.config().minTimeStep < rest;
+  if (isChosenLater && space.getTimeStep() > rest) {
+    space.setTimeStep(rest);
+  }
+  // A millionth of a step that would be left is rounding in the sum of steps.
+  if (isChosenLater || rest > space.getTimeStep() * (1.0 + 1e-6)) {
+    space.computeDynamics(space.steps());
+  } else {
+    space.advanceTo(end);
+  }
+}
+
 /// Lets threads that wait sleep rather than spin. A step has some dozens of short parallel parts; where other
 /// programs want the same processors, spinning threads take away the time of those that they wait for, and
 /// make a step ten times slower. OpenMP reads this setting only when a program is loaded, so it is loaded
@@ -220,13 +238,8 @@ int run(const Options& options) {
 
   onStopSignals(requestStop);
   observe();
-  const double near = 1.0 - 1e-9;  // of the end: a step that lands beside it by rounding is the last one
   while (space.time() < scene.duration && stopRequested == 0) {
-    if (space.time() + space.getTimeStep() < scene.duration * near) {
-      space.computeDynamics(space.steps());
-    } else {
-      space.advanceTo(scene.duration);
-    }
+    stepTowards(space, scene.duration);
     diagnostics.count(space);
     observe();
   }
