@@ -221,11 +221,12 @@ int run(const Options& options) {
   Progress progress(scene.units, scene.duration, options.quiet);
   space.setLog([](const char* line) { std::fprintf(stderr, "%s\n", line); });
 
-  const auto observe = [&] {
-    if (rows.isDue(space.time())) {
+  // A stop has its row and its frame, as the end has, whether they are due or not.
+  const auto observe = [&](bool isStop) {
+    if (rows.isDue(space.time()) || isStop) {
       diagnostics.record(space);
     }
-    if (frames.isDue(space.time())) {
+    if (frames.isDue(space.time()) || (isStop && series)) {
       series->write(vtkPoints(space.bodies()), space.time());
     }
     if (marks.isDue(space.time())) {
@@ -237,18 +238,17 @@ int run(const Options& options) {
   };
 
   onStopSignals(requestStop);
-  observe();
-  while (space.time() < scene.duration && stopRequested == 0) {
+  observe(false);
+  bool isStop = false;
+  while (space.time() < scene.duration && !isStop) {
     stepTowards(space, scene.duration);
     diagnostics.count(space);
-    observe();
-  }
-  if (stopRequested != 0) {
-    diagnostics.record(space);
+    isStop = stopRequested != 0;
+    observe(isStop);
   }
   progress.finish(space, diagnostics.history().drift());
 
-  const RunFacts facts{stopRequested != 0, progress.seconds(), threadCount()};
+  const RunFacts facts{isStop, progress.seconds(), threadCount()};
   const std::string words = summary(scene, space, diagnostics.history(), facts);
   detail::writeFileWhole(folder / "summary.txt", words);
   if (talks) {
