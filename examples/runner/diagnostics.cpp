@@ -3,6 +3,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include <algorithm>
 #include <numeric>
 
 namespace gravel::runner {
@@ -16,15 +17,41 @@ Diagnostics::Diagnostics(const std::filesystem::path& path) : path_(path), file_
   }
 }
 
+namespace {
+
+/// Energy that lifts every body by its radius in the uniform field: what is in play in a heap that rests,
+/// even at height zero.
+double liftEnergy(const Space<double>& space) {
+  const double g = space.uniformField().norm();
+  double sum = 0.0;
+  for (const auto body : space.bodies()) {
+    sum += body.isFixed() ? 0.0 : body.mass() * g * body.radius();
+  }
+  return sum;
+}
+
+/// Motion and |potential|, but no more motion than the ledger knows a source of: where energy came from
+/// nothing it is measured against what there was without it.
+double energyInPlay(const EnergyLedger<double>& first, const EnergyLedger<double>& now) {
+  const double had = first.kinetic + first.rotational + std::abs(first.potential);
+  const double exchanged = std::abs(now.dissipated() - now.correction);
+  const double potential = std::abs(now.potential);
+  return potential + std::min(now.kinetic + now.rotational, had + potential + exchanged);
+}
+
+}  // namespace
+
 void Diagnostics::record(const Space<double>& space) {
   const EnergyLedger<double> e = space.energyLedger();
   History& h = history_;
   if (h.rows == 0) {
     h.first = e;
+    h.inPlay = liftEnergy(space);
   }
   h.last = e;
-  h.inPlay = std::max(h.inPlay, e.kinetic + e.rotational + std::abs(e.potential));
-  h.peakMotion = std::max(h.peakMotion, e.kinetic + e.rotational);
+  see(e.kinetic + e.rotational);
+  h.isFinite = h.isFinite && std::isfinite(e.total());
+  h.inPlay = std::max(h.inPlay, energyInPlay(h.first, e));
   h.worstDrift = std::max(h.worstDrift, std::abs(h.drift()));
   ++h.rows;
   file_ << space.time() << ',' << space.steps() << ',' << space.getPreviousTimeStep() << ','
@@ -35,6 +62,22 @@ void Diagnostics::record(const Space<double>& space) {
   if (!file_) {
     throw std::runtime_error("cannot write " + path_.string());
   }
+}
+
+void Diagnostics::count(const Space<double>& space) {
+  History& h = history_;
+  ++h.steps;
+  h.mostContacts = std::max(h.mostContacts, space.contactCount());
+  h.parts += space.contactSubsteps();
+  h.mostParts = std::max(h.mostParts, space.contactSubsteps());
+  EnergyLedger<double> now;
+  addKineticEnergy(space.bodies(), now);
+  see(now.kinetic + now.rotational);
+}
+
+void Diagnostics::see(double motion) {
+  history_.isFinite = history_.isFinite && std::isfinite(motion);
+  history_.peakMotion = std::max(history_.peakMotion, motion);
 }
 
 namespace {

@@ -5,7 +5,6 @@
 
 #include "scene.hpp"
 
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
 
@@ -14,17 +13,24 @@ namespace gravel::runner {
 /// What the ledger and the contacts said over the whole run.
 struct History {
   EnergyLedger<double> first, last;
-  double inPlay = 0.0;  ///< most kinetic + rotational + |potential| energy seen: the scale of the drift
+  double inPlay = 0.0;  ///< most energy in play of all rows: the scale of the drift
   double worstDrift = 0.0;
-  double peakMotion = 0.0;       ///< most kinetic + rotational energy seen
-  std::size_t mostContacts = 0;  ///< of all steps, not of the rows alone
+  double peakMotion = 0.0;       ///< most kinetic + rotational energy of all steps, not of the rows alone
+  bool isFinite = true;          ///< the energies were, in every step
+  std::size_t mostContacts = 0;  ///< of all steps, too
   std::size_t rows = 0;
   std::size_t steps = 0;  ///< that were counted
   std::size_t parts = 0;  ///< of these, each with its own contacts
   std::size_t mostParts = 0;
 
-  /// How far the ledger's total is from its start, over the energy in play.
-  double drift() const { return inPlay > 0.0 ? (last.total() - first.total()) / inPlay : 0.0; }
+  /// How far the ledger's total is from its start, over the energy in play; infinite where there was none.
+  double drift() const {
+    const double moved = last.total() - first.total();
+    return moved == 0.0 ? 0.0 : moved / inPlay;
+  }
+  /// Drift that no use of the results can bear: a share of the energy in play.
+  static constexpr double mostDrift = 0.05;
+  bool isToBeTrusted() const { return isFinite && worstDrift <= mostDrift; }
 };
 
 /// Writes a row of diagnostics.csv a call, and keeps the history.
@@ -34,15 +40,12 @@ class Diagnostics {
   explicit Diagnostics(const std::filesystem::path& path);
   void record(const Space<double>& space);
   /// A step is over.
-  void count(const Space<double>& space) {
-    ++history_.steps;
-    history_.mostContacts = std::max(history_.mostContacts, space.contactCount());
-    history_.parts += space.contactSubsteps();
-    history_.mostParts = std::max(history_.mostParts, space.contactSubsteps());
-  }
+  void count(const Space<double>& space);
   const History& history() const { return history_; }
 
  private:
+  void see(double motion);
+
   std::filesystem::path path_;
   std::ofstream file_;
   History history_;

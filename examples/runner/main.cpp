@@ -272,6 +272,9 @@ int run(const Options& options) {
   if (!options.noPicture && writePicture(folder / "picture.png", scene, space, trails)) {
     tell("Picture:", folder / "picture.png");
   }
+  if (!diagnostics.history().isFinite) {
+    throw std::runtime_error(notFinite);
+  }
   return facts.interrupted ? 130 : 0;
 }
 

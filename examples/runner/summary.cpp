@@ -2,6 +2,7 @@
 #include "text.hpp"
 
 #include <algorithm>
+#include <array>
 
 namespace gravel::runner {
 
@@ -56,7 +57,7 @@ void addContacts(std::string& text, const Scene& scene, const Space<double>& spa
                sceneLength(pile.axes[0], scene.units).c_str(), sceneLength(pile.axes[1], scene.units).c_str(),
                sceneLength(pile.axes[2], scene.units).c_str()) +
         format(", and its bodies fill %.0f %% of that.\n", 100.0 * pile.filling);
-    const double left = pile.internalMotion / history.peakMotion;
+    const double left = history.peakMotion > 0.0 ? pile.internalMotion / history.peakMotion : 0.0;
     if (pile.angularSpeed > 0.0) {
       text += "It turns once in " + sceneTime(2.0 * pi<double>() / pile.angularSpeed, scene.units) +
               (left < 1e-4 ? " and has come to rest otherwise" : " and its bodies still move") +
@@ -97,29 +98,43 @@ void addGravity(std::string& text, const Scene& scene, const Space<double>& spac
   }
 }
 
-void addEnergy(std::string& text, const History& h) {
-  const double motion = h.last.kinetic + h.last.rotational;
-  const double taken = h.last.restitution + h.last.friction + h.last.damping;
+/// What contacts and damping took, by process. Where bodies are jammed into each other one may put in what
+/// another takes: that is no share of the loss.
+void addLosses(std::string& text, const History& h) {
   struct Part {
     double energy;
     const char* what;
   };
-  if (taken > 1e-12 * h.inPlay) {
-    text += "Of the energy that was lost,";
-    bool first = true;
-    for (const Part& part : {Part{h.last.restitution, "inelastic hits"}, Part{h.last.friction, "friction"},
-                             Part{h.last.damping, "damping"}}) {
-      if (std::abs(part.energy) > 5e-4 * taken) {
-        text += format(first ? " %s took %.1f %%" : ", %s %.1f %%", part.what, 100.0 * part.energy / taken);
-        first = false;
-      }
+  const std::array<Part, 3> parts{Part{h.last.restitution, "inelastic hits"},
+                                  Part{h.last.friction, "friction"}, Part{h.last.damping, "damping"}};
+  double taken = 0.0;
+  for (const Part& part : parts) {
+    taken += std::max(part.energy, 0.0);
+  }
+  std::string list;
+  for (const Part& part : parts) {
+    if (part.energy > 5e-4 * taken) {
+      list +=
+          format(list.empty() ? " %s took %.1f %%" : ", %s %.1f %%", part.what, 100.0 * part.energy / taken);
     }
-    text += ".\n";
+  }
+  if (taken > 1e-12 * h.inPlay) {
+    text += "Of the energy that was lost," + list + ".\n";
+  }
+  for (const Part& part : parts) {
+    if (part.energy < -1e-6 * h.inPlay) {
+      text += capital(part.what) + format(" put in %.1e of the energy in play.\n", -part.energy / h.inPlay);
+    }
   }
   if (std::abs(h.last.correction) > 1e-6 * h.inPlay) {
     text += format("Pushing overlaps apart %s %.1e of the energy in play.\n",
                    h.last.correction < 0.0 ? "put in" : "took", std::abs(h.last.correction) / h.inPlay);
   }
+}
+
+void addEnergy(std::string& text, const History& h) {
+  const double motion = h.last.kinetic + h.last.rotational;
+  addLosses(text, h);
   if (h.peakMotion < 1e-9 * h.inPlay) {
     text += format("Nothing moved to speak of: the most kinetic energy seen is %.1e of the energy in play.\n",
                    h.peakMotion / h.inPlay);
@@ -131,6 +146,9 @@ void addEnergy(std::string& text, const History& h) {
   }
   text += format("The energy ledger is off by %.1e of the energy in play at the end, %.1e at most.\n",
                  std::abs(h.drift()), h.worstDrift);
+  if (!h.isToBeTrusted()) {
+    text += "This run is not to be trusted: energy came from nothing or was lost. Take a shorter timeStep.\n";
+  }
 }
 
 }  // namespace
@@ -148,10 +166,12 @@ std::string summary(const Scene& scene, const Space<double>& space, const Histor
         format("Contacts were solved in %.3g parts of a step, %zu at most.\n",
                static_cast<double>(history.parts) / static_cast<double>(history.steps), history.mostParts);
   }
-  if (space.n() > 0) {
+  if (history.isFinite) {
     addContacts(text, scene, space, history);
     addGravity(text, scene, space, history);
     addEnergy(text, history);
+  } else {
+    text += std::string(notFinite) + "\n";
   }
   text += format("That took %s with %s: %.0f steps a second.\n", wallTime(facts.seconds).c_str(),
                  counted(static_cast<std::size_t>(facts.threads), "thread", "threads").c_str(),
