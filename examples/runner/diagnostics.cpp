@@ -226,15 +226,58 @@ double deepestOverlap(const Space<double>& space) {
   return deepest;
 }
 
+namespace {
+
+/// Body i as seen from another: place, velocity and G times the mass that holds the two together.
+struct Pair {
+  Pair(const Space<double>& space, std::size_t i, std::size_t centre)
+      : x(space.body(i).position() - space.body(centre).position()),
+        v(space.body(i).velocity() - space.body(centre).velocity()),
+        mu(space.getG() *
+           (space.body(centre).mass() +
+            (space.body(centre).isFixed() ? 0.0 : static_cast<double>(space.body(i).mass())))) {}
+  /// Per mass; negative where they are bound.
+  double energy() const { return 0.5 * v.squaredNorm() - mu / x.norm(); }
+
+  Vector3<double> x, v;
+  double mu;
+};
+
+double distance(const Space<double>& space, std::size_t i, std::size_t j) {
+  return (space.body(i).position() - space.body(j).position()).norm();
+}
+
+}  // namespace
+
 Orbit orbitAbout(const Space<double>& space, std::size_t i, std::size_t centre) {
-  const auto body = space.body(i);
-  const auto sun = space.body(centre);
-  const Vector3<double> x = body.position() - sun.position();
-  const Vector3<double> v = body.velocity() - sun.velocity();
-  const double mu = space.getG() * (body.mass() + sun.mass());
+  const auto [x, v, mu] = Pair(space, i, centre);
   const double a = 1.0 / (2.0 / x.norm() - v.squaredNorm() / mu);
   const double e = ((v.squaredNorm() - mu / x.norm()) * x - x.dot(v) * v).norm() / mu;
   return {a, e, a > 0.0 ? 2.0 * pi<double>() * std::sqrt(a * a * a / mu) : std::nan("")};
+}
+
+std::optional<std::size_t> centreOf(const Space<double>& space, std::size_t i, std::size_t heaviest) {
+  std::size_t centre = heaviest;
+  double lowest = 0.0;
+  for (std::size_t j = 0; j < space.n(); ++j) {
+    if (j == heaviest || !(space.body(j).mass() > space.body(i).mass())) {
+      continue;
+    }
+    const double hillRadius =
+        distance(space, j, heaviest) * std::cbrt(space.body(j).mass() / (3.0 * space.body(heaviest).mass()));
+    const double energy = Pair(space, i, j).energy();
+    if (distance(space, i, j) < hillRadius && energy < lowest) {
+      centre = j;
+      lowest = energy;
+    }
+  }
+  const double reach = distance(space, i, centre);
+  double inside = 0.0;
+  for (std::size_t j = 0; j < space.n(); ++j) {
+    inside += j != i && j != centre && distance(space, j, centre) < reach ? space.body(j).mass() : 0.0;
+  }
+  const bool isOfTwo = inside <= 0.01 * space.body(centre).mass() && space.config().softening <= 0.01 * reach;
+  return isOfTwo ? std::optional(centre) : std::nullopt;
 }
 
 }  // namespace gravel::runner

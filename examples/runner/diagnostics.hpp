@@ -72,10 +72,17 @@ double boundFraction(const Space<double>& space);
 /// Deepest overlap of two bodies over the smaller radius, at the last step's contacts.
 double deepestOverlap(const Space<double>& space);
 
-/// The two-body orbit of body i about body `centre` through its present place and velocity.
+/// The two-body orbit of body i about body `centre` through its present place and velocity. What is fixed is
+/// not pulled in turn, and its mass counts alone.
 struct Orbit {
   double semiMajorAxis, eccentricity, period;  ///< NaN where there is none: the body flies past
 };
 Orbit orbitAbout(const Space<double>& space, std::size_t i, std::size_t centre);
+
+/// The body that holds body i, `heaviest` being the heaviest of all: of the heavier ones in whose Hill sphere
+/// it is the one to which it is bound most tightly, else `heaviest`. Nothing where no ellipse of two bodies
+/// describes it: others of more than a hundredth of that body's mass are nearer to it than i, or gravity is
+/// softened at that distance.
+std::optional<std::size_t> centreOf(const Space<double>& space, std::size_t i, std::size_t heaviest);
 
 }  // namespace gravel::runner

@@ -66,15 +66,8 @@ void addContacts(std::string& text, const Scene& scene, const Space<double>& spa
   }
 }
 
-void addGravity(std::string& text, const Scene& scene, const Space<double>& space, const History& history) {
+void addOrbits(std::string& text, const Scene& scene, const Space<double>& space) {
   const std::size_t n = space.n();
-  if (!(space.getG() > 0.0) || n < 2 || n > 30000 || !space.domain().isOpen()) {  // images pull as well
-    return;
-  }
-  if (n > 20 || history.mostContacts > 0) {
-    text += "Bound by gravity: " + percent(boundFraction(space)) + " of the mass.\n";
-    return;
-  }
   std::size_t heaviest = 0;
   for (std::size_t i = 1; i < n; ++i) {
     heaviest = space.body(i).mass() > space.body(heaviest).mass() ? i : heaviest;
@@ -84,17 +77,34 @@ void addGravity(std::string& text, const Scene& scene, const Space<double>& spac
     return known != nullptr && !known->name.empty() ? known->name
                                                     : "body " + std::to_string(toInteger(space.body(i).id()));
   };
-  text += "Orbits about " + name(heaviest) + ":\n";
+  std::string lines;
   for (std::size_t i = 0; i < n; ++i) {
-    if (i != heaviest) {
-      const Orbit orbit = orbitAbout(space, i, heaviest);
-      text += format("  %-10s", name(i).c_str());
-      text += std::isnan(orbit.period)
-                  ? " flies past\n"
-                  : format(" semi-major axis %.4g %s, eccentricity %.4f, period %s\n", orbit.semiMajorAxis,
-                           scene.units.length.c_str(), orbit.eccentricity,
-                           sceneTime(orbit.period, scene.units).c_str());
+    const std::optional<std::size_t> centre = i == heaviest ? std::nullopt : centreOf(space, i, heaviest);
+    if (centre && !space.body(i).isFixed()) {
+      const Orbit orbit = orbitAbout(space, i, *centre);
+      lines += format("  %-10s", name(i).c_str());
+      lines += *centre == heaviest ? "" : " about " + name(*centre) + ":";
+      lines += std::isnan(orbit.period)
+                   ? " flies past\n"
+                   : format(" semi-major axis %.4g %s, eccentricity %.4f, period %s\n", orbit.semiMajorAxis,
+                            scene.units.length.c_str(), orbit.eccentricity,
+                            sceneTime(orbit.period, scene.units).c_str());
     }
+  }
+  text += lines.empty() ? "" : "Orbits about " + name(heaviest) + ":\n" + lines;
+}
+
+/// What gravity alone holds: nothing is said where images pull as well, or a field and walls act.
+void addGravity(std::string& text, const Scene& scene, const Space<double>& space, const History& history) {
+  const bool alone =
+      space.domain().isOpen() && space.planes().empty() && space.uniformField() == Vector3<double>::Zero();
+  if (!(space.getG() > 0.0) || space.n() < 2 || space.n() > 30000 || !alone) {
+    return;
+  }
+  if (space.n() > 20 || history.mostContacts > 0) {
+    text += "Bound by gravity: " + percent(boundFraction(space)) + " of the mass.\n";
+  } else {
+    addOrbits(text, scene, space);
   }
 }
 
