@@ -4,6 +4,7 @@
 #include "diagnostics.hpp"
 #include "picture.hpp"
 #include "progress.hpp"
+#include "restart.hpp"
 #include "scene.hpp"
 #include "summary.hpp"
 #include "text.hpp"
@@ -50,7 +51,7 @@ void onStopSignals(void (*handler)(int)) {
 }
 
 struct Options {
-  std::string sceneFile, output;
+  std::string sceneFile, output, save, restart;
   std::optional<double> duration;
   std::optional<std::size_t> frames;
   int threads = 0;
@@ -74,6 +75,25 @@ Space<double> makeSpace(const Scene& scene) {
   return space;
 }
 
+/// The space that a run begins with: that of the scene, or the saved one of an earlier run of it.
+Space<double> firstSpace(const Scene& scene, const Options& options) {
+  const std::string sceneName = options.sceneFile.empty() ? builtinSceneName : options.sceneFile;
+  Space<double> space = [&] {
+    try {
+      return makeSpace(scene);
+    } catch (const std::invalid_argument& error) {
+      throw SceneError(sceneName + ": " + error.what());
+    } catch (const std::bad_alloc&) {
+      throw SceneError(sceneName + ": there is no memory for " +
+                       counted(scene.config.bodyCount + scene.bodies.size(), "body", "bodies"));
+    }
+  }();
+  if (!options.restart.empty()) {
+    takeUp(space, scene.duration, options.restart);
+  }
+  return space;
+}
+
 fs::path madeFolder(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
@@ -82,6 +102,16 @@ fs::path madeFolder(const fs::path& folder) {
                              (error ? error.message() : "there is a file of that name"));
   }
   return folder;
+}
+
+/// Refuses at the start of a run what could not be written at its end.
+void prepareFile(const fs::path& file) {
+  if (file.has_parent_path()) {
+    madeFolder(file.parent_path());
+  }
+  if (fs::is_directory(file)) {
+    throw std::runtime_error("cannot save to " + file.string() + ": it is a folder");
+  }
 }
 
 /// Keeps the folder for this run as long as the program lives, however it ends: two in one folder would write
@@ -176,29 +206,29 @@ int run(const Options& options) {
   scene.duration = options.duration.value_or(scene.duration);
   scene.output.frames = options.frames.value_or(scene.output.frames);
 
-  const std::string sceneName = options.sceneFile.empty() ? builtinSceneName : options.sceneFile;
-  Space<double> space = [&] {
-    try {
-      return makeSpace(scene);
-    } catch (const std::invalid_argument& error) {
-      throw SceneError(sceneName + ": " + error.what());
-    } catch (const std::bad_alloc&) {
-      throw SceneError(sceneName + ": there is no memory for " +
-                       counted(scene.config.bodyCount + scene.bodies.size(), "body", "bodies"));
-    }
-  }();
+  Space<double> space = firstSpace(scene, options);
+  const bool isRestart = !options.restart.empty();
+  const double begin = space.time();
   const bool talks = !options.quiet;
   if (talks || options.check) {
     std::printf("%s: %s, %s\n", scene.title.empty() ? scene.name.c_str() : scene.title.c_str(),
                 counted(space.n(), "body", "bodies").c_str(), sceneTime(scene.duration, scene.units).c_str());
+    if (isRestart) {
+      std::printf("taken up at %s, step %zu\n", sceneTime(space.time(), scene.units).c_str(), space.steps());
+    }
   }
   if (options.check) {
     return 0;
   }
 
+  // The first part of a run that is taken up keeps its folder.
+  const std::string name = scene.name + (isRestart ? "_from_step_" + std::to_string(space.steps()) : "");
   const fs::path folder =
-      madeFolder(options.output.empty() ? fs::path("out") / scene.name : fs::path(options.output));
+      madeFolder(options.output.empty() ? fs::path("out") / name : fs::path(options.output));
   claim(folder);
+  if (!options.save.empty()) {
+    prepareFile(options.save);
+  }
   // What an earlier run said at its end is not of this one, which may end without a word.
   for (const fs::path& last :
        {fs::path("summary.txt"), fs::path("picture.png"), "frames" / fs::path(scene.name + ".pvd")}) {
@@ -218,7 +248,7 @@ int run(const Options& options) {
   Schedule rows(std::max<std::size_t>(scene.output.rows, 2), scene.duration);
   Schedule marks(scene.picture.trails ? 2000 : 0, scene.duration);
   Trails trails(scene.picture.trails ? space.n() : 0);
-  Progress progress(scene.units, scene.duration, options.quiet);
+  Progress progress(scene.units, scene.duration, options.quiet, space);
   space.setLog([](const char* line) { std::fprintf(stderr, "%s\n", line); });
 
   // A stop has its row and its frame, as the end has, whether they are due or not.
@@ -243,12 +273,16 @@ int run(const Options& options) {
   while (space.time() < scene.duration && !isStop) {
     stepTowards(space, scene.duration);
     diagnostics.count(space);
-    isStop = stopRequested != 0;
+    isStop = stopRequested != 0 && space.time() < scene.duration;
     observe(isStop);
   }
   progress.finish(space, diagnostics.history().drift());
 
-  const RunFacts facts{isStop, progress.seconds(), threadCount()};
+  if (!options.save.empty()) {
+    space.save(options.save);
+  }
+
+  const RunFacts facts{isStop, begin, progress.seconds(), threadCount()};
   const std::string words = summary(scene, space, diagnostics.history(), facts);
   detail::writeFileWhole(folder / "summary.txt", words);
   if (talks) {
@@ -267,6 +301,9 @@ int run(const Options& options) {
   tell("Summary:", folder / "summary.txt");
   if (series) {
     tell("Frames:", series->index().string() + "  (" + std::to_string(series->frames()) + ", for ParaView)");
+  }
+  if (!options.save.empty()) {
+    tell("State:", options.save);
   }
   onStopSignals(SIG_DFL);  // all but the picture is there
   if (!options.noPicture && writePicture(folder / "picture.png", scene, space, trails)) {
@@ -300,6 +337,9 @@ int main(int argc, char** argv) {
       });
   app.add_option("-o,--output", options.output,
                  "folder for what is written; default: out/<name of the scene>");
+  app.add_option("--save", options.save, "file for the state at the end, or where the run was stopped");
+  app.add_option("--restart", options.restart,
+                 "saved state of this scene that the run goes on from, to the end of its duration");
   app.add_option("--duration", options.duration, "time to simulate, in place of the scene's own")
       ->check([](const std::string& text) {
         double time = 0.0;

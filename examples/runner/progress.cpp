@@ -21,12 +21,14 @@ bool isTerminal() {
 
 }  // namespace
 
-Progress::Progress(const Units& units, double duration, bool quiet)
+Progress::Progress(const Units& units, double duration, bool quiet, const Space<double>& space)
     : units_(units),
       duration_(duration),
       quiet_(quiet),
       terminal_(isTerminal()),
-      pause_(terminal_ ? 0.2 : 5.0) {}
+      pause_(terminal_ ? 0.2 : 5.0),
+      lastTime_(space.time()),
+      lastSteps_(space.steps()) {}
 
 double Progress::seconds() const { return std::chrono::duration<double>(Clock::now() - start_).count(); }
 

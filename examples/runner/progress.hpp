@@ -12,7 +12,8 @@ namespace gravel::runner {
 /// On a terminal one line, rewritten a few times a second; else a line now and then.
 class Progress {
  public:
-  Progress(const Units& units, double duration, bool quiet);
+  /// \param space  as the run begins with it
+  Progress(const Units& units, double duration, bool quiet, const Space<double>& space);
 
   /// Shows the state if it is time to. Cheap enough for every step.
   void show(const Space<double>& space, double drift);
@@ -33,8 +34,8 @@ class Progress {
   double pause_;
   // Speed over the last lines rather than the whole run: a scene slows down as it gets dense.
   double rate_ = 0.0, timeRate_ = 0.0;
-  double lastSeconds_ = 0.0, lastTime_ = 0.0;
-  std::size_t lastSteps_ = 0;
+  double lastSeconds_ = 0.0, lastTime_;
+  std::size_t lastSteps_;
 };
 
 }  // namespace gravel::runner

@@ -171,6 +171,10 @@ std::string summary(const Scene& scene, const Space<double>& space, const Histor
                  scene.units.mass.c_str(), sceneTime(space.time(), scene.units).c_str(),
                  counted(space.steps(), "step", "steps").c_str(),
                  space.config().adaptiveTimeStep ? "changing length" : "equal length");
+  if (facts.begin > 0.0) {
+    text += "Taken up at " + sceneTime(facts.begin, scene.units) +
+            ": contacts, losses and drift below are those since then.\n";
+  }
   if (history.mostParts > 1) {
     text +=
         format("Contacts were solved in %.3g parts of a step, %zu at most.\n",
@@ -185,7 +189,7 @@ std::string summary(const Scene& scene, const Space<double>& space, const Histor
   }
   text += format("That took %s with %s: %.0f steps a second.\n", wallTime(facts.seconds).c_str(),
                  counted(static_cast<std::size_t>(facts.threads), "thread", "threads").c_str(),
-                 static_cast<double>(space.steps()) / std::max(facts.seconds, 1e-9));
+                 static_cast<double>(history.steps) / std::max(facts.seconds, 1e-9));
   return text;
 }
 

@@ -11,6 +11,7 @@ namespace gravel::runner {
 
 struct RunFacts {
   bool interrupted = false;
+  double begin = 0.0;    ///< time of the scene at which the run was taken up; 0 for a whole one
   double seconds = 0.0;  ///< of the wall clock, for the steps
   int threads = 1;
 };

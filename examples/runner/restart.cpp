@@ -1,0 +1,71 @@
+#include "restart.hpp"
+#include "text.hpp"
+
+namespace gravel::runner {
+
+namespace {
+
+/// Name and value of every setting.
+std::vector<std::pair<std::string, std::string>> settingsOf(const SimulationConfig<double>& config) {
+  std::vector<std::pair<std::string, std::string>> list;
+  forEachSetting(config, [&]<class T>(const Setting<double>& setting, const T& value) {
+    if constexpr (std::is_same_v<T, double>) {
+      list.emplace_back(setting.name, detail::formatReal(value));
+    } else if constexpr (std::is_enum_v<T>) {
+      list.emplace_back(setting.name, EnumNames<T>::values[static_cast<std::size_t>(value)]);
+    } else {
+      list.emplace_back(setting.name, std::to_string(value));
+    }
+  });
+  return list;
+}
+
+bool areAlike(const Space<double>& a, const Space<double>& b, std::size_t i) {
+  return a.body(i).id() == b.body(i).id() && a.body(i).mass() == b.body(i).mass() &&
+         a.body(i).radius() == b.body(i).radius() && a.body(i).isFixed() == b.body(i).isFixed();
+}
+
+/// What of a saved state does not belong to the scene that starts as `start`; empty if all does.
+std::string misfit(const Space<double>& start, const Space<double>& saved) {
+  if (saved.n() != start.n()) {
+    return "it has " + counted(saved.n(), "body", "bodies") + ", the scene " + std::to_string(start.n());
+  }
+  for (std::size_t i = 0; i < start.n(); ++i) {
+    if (!areAlike(start, saved, i)) {
+      return "mass, radius or \"fixed\" of its body " + std::to_string(i) + " is not the scene's";
+    }
+  }
+  SimulationConfig<double> config = start.config();
+  if (config.adaptiveTimeStep) {  // a run keeps its longest step within its duration
+    config.timeStep = std::min(config.timeStep, saved.config().timeStep);
+  }
+  const auto asked = settingsOf(config);
+  const auto found = settingsOf(saved.config());
+  for (std::size_t k = 0; k < asked.size(); ++k) {
+    if (asked[k] != found[k]) {
+      return "its " + found[k].first + " is " + found[k].second + ", the scene's " + asked[k].second;
+    }
+  }
+  if (!(saved.domain() == start.domain()) || saved.uniformField() != start.uniformField() ||
+      saved.planes().size() != start.planes().size()) {
+    return "its domain, field or planes are not the scene's";
+  }
+  return {};
+}
+
+}  // namespace
+
+void takeUp(Space<double>& space, double duration, const std::string& file) {
+  const Space<double> start = space;
+  space.restore(file);
+  const std::string other = misfit(start, space);
+  if (!other.empty()) {
+    throw SceneError(file + ": is the state of another scene: " + other);
+  }
+  if (!(space.time() < duration)) {
+    throw SceneError(file + ": is the state at time " + detail::formatReal(space.time()) +
+                     "; allowed: one before the end, " + detail::formatReal(duration));
+  }
+}
+
+}  // namespace gravel::runner

@@ -1,0 +1,73 @@
+#!/bin/sh
+# check_restart.sh <gravel-run> <folder>
+#
+# A run that ends halfway, or is stopped by Ctrl-C somewhere, and is taken up again ends with the same bits as one in
+# one go: the saved state, the last frame and the energies of the last row. States that do not fit are refused.
+set -u
+rm -rf "$2"
+mkdir -p "$2"
+cat >"$2/grains.toml" <<'end'
+duration = 2
+simulation = {G = 0, timeStep = 0.0009765625, adaptiveTimeStep = false}
+field.acceleration = [0, 0, -9.81]
+output = {frames = 201, rows = 201}
+[[box]]
+low = [-0.05, -0.05, 0]
+high = [0.05, 0.05, 1]
+[[column]]
+count = 150
+base = [0, 0, 0.01]
+radius = 0.03
+end
+sed 's/G = 0/G = 1/' "$2/grains.toml" >"$2/other_settings.toml"
+sed 's/count = 150/count = 151/' "$2/grains.toml" >"$2/other_bodies.toml"
+
+go() {  # <scene> <name of the run> [option ...]
+  scene=$1
+  name=$2
+  shift 2
+  "$run" "$folder/$scene.toml" -q --no-picture -o "$folder/$name" --save "$folder/$name.gravel" "$@"
+}
+last_energies() { tail -n 1 "$folder/$1/diagnostics.csv" | cut -d , -f 1-13; }
+same() {  # <name of the run>: ends as the one in one go
+  cmp "$folder/whole.gravel" "$folder/$1.gravel" || exit 1
+  cmp "$folder/whole/frames/grains_000200.vtp" "$(ls "$folder/$1"/frames/*.vtp | tail -n 1)" || exit 1
+  [ "$(last_energies whole)" = "$(last_energies "$1")" ] || { echo "$1: other energies"; exit 1; }
+}
+refuses() {  # <exit code> <words> <scene> <option ...>
+  expected=$1
+  words=$2
+  scene=$3
+  shift 3
+  said=$("$run" "$folder/$scene.toml" -q --no-picture -o "$folder/refused" "$@" 2>&1)
+  status=$?
+  echo "$said" | grep -q "$words" && [ $status -eq "$expected" ] && return
+  echo "ended with $status, not $expected and \"$words\": $said"
+  exit 1
+}
+run=$1
+folder=$2
+
+go grains whole || exit 1
+go grains half --duration 1 || exit 1
+go grains halves --restart "$folder/half.gravel" || exit 1
+same halves
+grep -q "^Taken up at 1 s: " "$folder/halves/summary.txt" || { echo "the summary does not tell of the restart"; exit 1; }
+
+"$run" "$folder/grains.toml" -q --no-picture -o "$folder/stopped" --save "$folder/stopped.gravel" &
+process=$!
+while [ ! -e "$folder/stopped/frames/grains_000020.vtp" ]; do
+  kill -0 $process 2>/dev/null || { echo "the run did not begin"; exit 1; }
+  sleep 0.01
+done
+kill -INT $process
+wait $process
+[ $? -eq 130 ] || { echo "the run was not stopped"; exit 1; }
+go grains continued --restart "$folder/stopped.gravel" || exit 1
+same continued
+
+refuses 2 "state of another scene: it has 150 bodies, the scene 151" other_bodies --restart "$folder/half.gravel"
+refuses 2 "state of another scene: its G is 0, the scene's 1" other_settings --restart "$folder/half.gravel"
+refuses 2 "is the state at time 2; allowed: one before the end, 2" grains --restart "$folder/whole.gravel"
+refuses 1 "grains.toml" grains --restart "$folder/grains.toml"
+refuses 1 "cannot save to .*: it is a folder" grains --save "$folder/whole"
