@@ -46,7 +46,7 @@ void readSimulation(TableReader& reader, SimulationConfig<double>& config) {
       }
     }
   });
-  if (!reader.faults().any()) {
+  if (reader.isSound()) {
     try {
       config.validate();
     } catch (const std::invalid_argument& error) {
@@ -64,7 +64,16 @@ void readLook(TableReader& reader, SceneBody& look) {
   reader.colour("colour", look.colour);
 }
 
-void readBody(TableReader& reader, std::vector<SceneBody>& bodies) {
+/// A body must fit its periodic box. That of a domain which was not understood counts as open.
+void requireRoom(TableReader& reader, const char* key, double radius, const Domain<double>& domain) {
+  const double most = 0.5 * domain.lengths().minCoeff();
+  if (!domain.isOpen() && radius > most) {
+    reader.fault(key, detail::formatReal(radius),
+                 "at most half an edge of the domain, " + detail::formatReal(most));
+  }
+}
+
+void readBody(TableReader& reader, const Domain<double>& domain, std::vector<SceneBody>& bodies) {
   SceneBody entry;
   Body<double>& body = entry.body;
   reader.text("name", entry.name);
@@ -75,6 +84,7 @@ void readBody(TableReader& reader, std::vector<SceneBody>& bodies) {
   reader.numbers<4>("orientation", orientation);
   body.orientation.coeffs() = orientation;
   const bool understood = reader.real("radius", body.radius, notNegative()) || !reader.has("radius");
+  requireRoom(reader, "radius", body.radius, domain);
   double density = 0.0;
   const bool hasMass = reader.has("mass");
   const bool hasDensity = reader.has("density");
@@ -94,7 +104,7 @@ void readBody(TableReader& reader, std::vector<SceneBody>& bodies) {
   }
   reader.flag("fixed", body.fixed);
   readLook(reader, entry);
-  if (!reader.faults().any()) {
+  if (reader.isSound()) {
     try {
       validate(body, entry.name.empty() ? "body " + std::to_string(bodies.size()) : "\"" + entry.name + "\"");
     } catch (const std::invalid_argument& error) {
@@ -118,11 +128,11 @@ void append(TableReader& reader, std::vector<SceneBody>& bodies, const SceneBody
   }
 }
 
-/// Runs a generator of `count` bodies unless a fault stands already; what it refuses is a fault of its table.
+/// Runs a generator of `count` bodies unless its table has a fault already; what it refuses is one, too.
 template <class Generate>
 void generate(TableReader& reader, std::vector<SceneBody>& bodies, const SceneBody& look, std::size_t count,
               Generate&& make) {
-  if (reader.faults().any()) {
+  if (!reader.isSound()) {
     return;
   }
   try {
@@ -140,7 +150,7 @@ std::uint64_t readSeed(TableReader& reader) {
   return seed;
 }
 
-void readCloud(TableReader& reader, std::vector<SceneBody>& bodies) {
+void readCloud(TableReader& reader, const Domain<double>& domain, std::vector<SceneBody>& bodies) {
   scenes::CloudOptions options;
   Vector3<double> position = Vector3<double>::Zero(), velocity = Vector3<double>::Zero();
   reader.count("count", options.count, 1, mostBodies);
@@ -149,6 +159,7 @@ void readCloud(TableReader& reader, std::vector<SceneBody>& bodies) {
   reader.vector("velocity", velocity);
   reader.real("radius", options.radius, positive());
   reader.interval("bodyRadius", options.bodyRadius, positive());
+  requireRoom(reader, "bodyRadius", options.bodyRadius[1], domain);
   reader.real("sizeExponent", options.sizeExponent, notNegative());
   reader.interval("density", options.density, positive());
   reader.vector("spin", options.spin);
@@ -166,7 +177,7 @@ void readCloud(TableReader& reader, std::vector<SceneBody>& bodies) {
   });
 }
 
-void readColumn(TableReader& reader, std::vector<SceneBody>& bodies) {
+void readColumn(TableReader& reader, const Domain<double>& domain, std::vector<SceneBody>& bodies) {
   scenes::ColumnOptions options;
   reader.count("count", options.count, 1, mostBodies);
   options.seed = readSeed(reader);
@@ -174,6 +185,7 @@ void readColumn(TableReader& reader, std::vector<SceneBody>& bodies) {
   reader.vector("velocity", options.velocity);
   reader.real("radius", options.radius, positive());
   reader.interval("bodyRadius", options.bodyRadius, positive());
+  requireRoom(reader, "bodyRadius", options.bodyRadius[1], domain);
   reader.real("density", options.density, positive());
   SceneBody look;
   readLook(reader, look);
@@ -357,9 +369,9 @@ Scene interpret(const toml::table& table, Faults& faults) {
   top.table("field", [&](TableReader& reader) { reader.vector("acceleration", scene.field); });
   top.tables("plane", [&](TableReader& reader) { readPlane(reader, scene.config, scene.planes); });
   top.tables("box", [&](TableReader& reader) { readBox(reader, scene.config, scene.planes); });
-  top.tables("body", [&](TableReader& reader) { readBody(reader, scene.bodies); });
-  top.tables("cloud", [&](TableReader& reader) { readCloud(reader, scene.bodies); });
-  top.tables("column", [&](TableReader& reader) { readColumn(reader, scene.bodies); });
+  top.tables("body", [&](TableReader& reader) { readBody(reader, scene.domain, scene.bodies); });
+  top.tables("cloud", [&](TableReader& reader) { readCloud(reader, scene.domain, scene.bodies); });
+  top.tables("column", [&](TableReader& reader) { readColumn(reader, scene.domain, scene.bodies); });
   const bool enclosed = !scene.domain.isOpen() || !scene.planes.empty();
   top.tables("gas", [&](TableReader& reader) { readGas(reader, enclosed, scene.bodies); });
   top.table("output", [&](TableReader& reader) {

@@ -28,6 +28,7 @@ class Faults {
   void add(toml::source_index line, const std::string& what) { list_.emplace_back(line, what); }
 
   bool any() const { return !list_.empty(); }
+  std::size_t count() const { return list_.size(); }
 
   std::string text() {
     std::stable_sort(list_.begin(), list_.end(),
@@ -94,8 +95,10 @@ class TableReader {
   using Range = detail::Range<double>;
 
   TableReader(const toml::table& table, std::string name, Faults& faults)
-      : table_(table), name_(std::move(name)), faults_(faults) {}
+      : table_(table), name_(std::move(name)), faults_(faults), faultsBefore_(faults.count()) {}
 
+  /// No fault was found in this table so far: values that depend on each other can be looked at together.
+  bool isSound() const { return faults_.count() == faultsBefore_; }
   bool has(const char* key) const { return table_.contains(key); }
   const toml::source_region& where() const { return table_.source(); }
   Faults& faults() const { return faults_; }
@@ -338,6 +341,7 @@ class TableReader {
   const toml::table& table_;
   std::string name_;
   Faults& faults_;
+  std::size_t faultsBefore_;
   std::vector<std::string> known_;
 };
 
