@@ -192,7 +192,7 @@ void readColumn(TableReader& reader, const Domain<double>& domain, std::vector<S
   generate(reader, bodies, look, options.count, [&] { return scenes::grainColumn<double>(options); });
 }
 
-/// Balls of diameter 1 and mass 1 in a cube, which something has to hold together.
+/// Balls of diameter 1 and mass 1 in a cube, which walls on all sides have to hold together.
 void readGas(TableReader& reader, bool enclosed, std::vector<SceneBody>& bodies) {
   std::size_t count = 1000;
   double fraction = 0.1;
@@ -200,8 +200,10 @@ void readGas(TableReader& reader, bool enclosed, std::vector<SceneBody>& bodies)
   reader.real("fraction", fraction, {1e-9, 0.3, "0 to 0.3"});
   const std::uint64_t seed = readSeed(reader);
   if (!enclosed) {
+    const double length = scenes::gasBoxLength(count, fraction);
     reader.missing("walls: give a [domain] of kind \"periodic\" with three lengths of " +
-                   detail::formatReal(scenes::gasBoxLength(count, fraction)) + ", or a [[box]] around it");
+                   detail::formatReal(length) + ", or a [[box]] with no open face, " +
+                   detail::formatReal(0.5 * length + 0.5) + " or more to each side of the origin");
   }
   SceneBody look;
   look.surface = Surface::Smooth;
@@ -263,8 +265,9 @@ void readPlane(TableReader& reader, const SimulationConfig<double>& config, std:
   planes.push_back(plane);
 }
 
-/// Up to six planes that look inwards: the faces of the box from `low` to `high`, without those in `open`.
-void readBox(TableReader& reader, const SimulationConfig<double>& config, std::vector<ScenePlane>& planes) {
+/// Up to six planes that look inwards: the faces of the box from `low` to `high`, but for the one in `open`.
+/// True if it is closed on all sides.
+bool readBox(TableReader& reader, const SimulationConfig<double>& config, std::vector<ScenePlane>& planes) {
   static const std::vector<std::string> faces{"-x", "+x", "-y", "+y", "-z", "+z"};
   Vector3<double> low = Vector3<double>::Constant(-1), high = Vector3<double>::Constant(1);
   if (!reader.vector("low", low) || !reader.vector("high", high)) {
@@ -290,6 +293,7 @@ void readBox(TableReader& reader, const SimulationConfig<double>& config, std::v
       planes.push_back(plane);
     }
   }
+  return !reader.has("open");
 }
 
 void readDomain(TableReader& reader, Domain<double>& domain) {
@@ -365,14 +369,20 @@ Scene interpret(const toml::table& table, Faults& faults) {
     reader.text("mass", scene.units.mass);
   });
   top.table("simulation", [&](TableReader& reader) { readSimulation(reader, scene.config); });
-  top.table("domain", [&](TableReader& reader) { readDomain(reader, scene.domain); });
+  bool domainIsKnown = true;
+  top.table("domain", [&](TableReader& reader) {
+    readDomain(reader, scene.domain);
+    domainIsKnown = reader.isSound();
+  });
   top.table("field", [&](TableReader& reader) { reader.vector("acceleration", scene.field); });
   top.tables("plane", [&](TableReader& reader) { readPlane(reader, scene.config, scene.planes); });
-  top.tables("box", [&](TableReader& reader) { readBox(reader, scene.config, scene.planes); });
+  bool enclosed = !scene.domain.isOpen() || !domainIsKnown;
+  top.tables("box", [&](TableReader& reader) {
+    enclosed = readBox(reader, scene.config, scene.planes) || enclosed;
+  });
   top.tables("body", [&](TableReader& reader) { readBody(reader, scene.domain, scene.bodies); });
   top.tables("cloud", [&](TableReader& reader) { readCloud(reader, scene.domain, scene.bodies); });
   top.tables("column", [&](TableReader& reader) { readColumn(reader, scene.domain, scene.bodies); });
-  const bool enclosed = !scene.domain.isOpen() || !scene.planes.empty();
   top.tables("gas", [&](TableReader& reader) { readGas(reader, enclosed, scene.bodies); });
   top.table("output", [&](TableReader& reader) {
     reader.count("frames", scene.output.frames, 0, mostRecords);
