@@ -226,11 +226,42 @@ double deepestOverlap(const Space<double>& space) {
   return deepest;
 }
 
+Overlaps overlapsAtStart(const Space<double>& space) {
+  Overlaps overlaps;
+  std::vector<bool> isDeep(space.n(), false);
+  const auto note = [&](std::size_t i, double depth) {
+    if (depth > 0.1 && !space.body(i).isFixed()) {
+      isDeep[i] = true;
+      overlaps.deepest = std::max(overlaps.deepest, depth);
+    }
+  };
+  std::vector<Pair> pairs;
+  BroadPhase<double>().findPairs(space.bodies().positions(), space.bodies().radii(), space.bodies().ids(),
+                                 0.0, space.domain(), space.time(), pairs);
+  for (const Pair& pair : pairs) {
+    const auto a = space.body(pair.first), b = space.body(pair.second);
+    const Vector3<double> r = space.domain().minimumImage(b.position() - a.position(), space.time());
+    const double depth = (a.radius() + b.radius() - r.norm()) / std::min<double>(a.radius(), b.radius());
+    note(pair.first, depth);
+    note(pair.second, depth);
+  }
+  for (std::size_t i = 0; i < space.n(); ++i) {
+    const auto body = space.body(i);
+    for (const Plane<double>& plane : space.planes()) {
+      if (body.radius() > 0.0) {
+        note(i, (plane.offset + body.radius() - plane.normal.dot(body.position())) / body.radius());
+      }
+    }
+  }
+  overlaps.bodies = static_cast<std::size_t>(std::count(isDeep.begin(), isDeep.end(), true));
+  return overlaps;
+}
+
 namespace {
 
 /// Body i as seen from another: place, velocity and G times the mass that holds the two together.
-struct Pair {
-  Pair(const Space<double>& space, std::size_t i, std::size_t centre)
+struct TwoBodies {
+  TwoBodies(const Space<double>& space, std::size_t i, std::size_t centre)
       : x(space.body(i).position() - space.body(centre).position()),
         v(space.body(i).velocity() - space.body(centre).velocity()),
         mu(space.getG() *
@@ -250,7 +281,7 @@ double distance(const Space<double>& space, std::size_t i, std::size_t j) {
 }  // namespace
 
 Orbit orbitAbout(const Space<double>& space, std::size_t i, std::size_t centre) {
-  const auto [x, v, mu] = Pair(space, i, centre);
+  const auto [x, v, mu] = TwoBodies(space, i, centre);
   const double a = 1.0 / (2.0 / x.norm() - v.squaredNorm() / mu);
   const double e = ((v.squaredNorm() - mu / x.norm()) * x - x.dot(v) * v).norm() / mu;
   return {a, e, a > 0.0 ? 2.0 * pi<double>() * std::sqrt(a * a * a / mu) : std::nan("")};
@@ -265,7 +296,7 @@ std::optional<std::size_t> centreOf(const Space<double>& space, std::size_t i, s
     }
     const double hillRadius =
         distance(space, j, heaviest) * std::cbrt(space.body(j).mass() / (3.0 * space.body(heaviest).mass()));
-    const double energy = Pair(space, i, j).energy();
+    const double energy = TwoBodies(space, i, j).energy();
     if (distance(space, i, j) < hillRadius && energy < lowest) {
       centre = j;
       lowest = energy;

@@ -72,6 +72,13 @@ double boundFraction(const Space<double>& space);
 /// Deepest overlap of two bodies over the smaller radius, at the last step's contacts.
 double deepestOverlap(const Space<double>& space);
 
+/// Bodies that begin inside each other or in a wall: they are pushed out, which is seldom what was meant.
+struct Overlaps {
+  std::size_t bodies = 0;  ///< that move, and are deeper than a tenth of a radius in others or in walls
+  double deepest = 0.0;    ///< over the smaller radius
+};
+Overlaps overlapsAtStart(const Space<double>& space);
+
 /// The two-body orbit of body i about body `centre` through its present place and velocity. What is fixed is
 /// not pulled in turn, and its mass counts alone.
 struct Orbit {

@@ -104,6 +104,17 @@ fs::path madeFolder(const fs::path& folder) {
   return folder;
 }
 
+void noteOverlaps(const Space<double>& space) {
+  const Overlaps overlaps = overlapsAtStart(space);
+  if (overlaps.bodies > 0) {
+    std::printf(
+        "note: %zu of %zu bodies begin in others or behind walls by more than a tenth of a radius, the "
+        "deepest "
+        "by %.3g radii\n",
+        overlaps.bodies, space.n(), overlaps.deepest);
+  }
+}
+
 /// Refuses at the start of a run what could not be written at its end.
 void prepareFile(const fs::path& file) {
   if (file.has_parent_path()) {
@@ -215,6 +226,8 @@ int run(const Options& options) {
                 counted(space.n(), "body", "bodies").c_str(), sceneTime(scene.duration, scene.units).c_str());
     if (isRestart) {
       std::printf("taken up at %s, step %zu\n", sceneTime(space.time(), scene.units).c_str(), space.steps());
+    } else {
+      noteOverlaps(space);
     }
   }
   if (options.check) {

@@ -73,6 +73,17 @@ void requireRoom(TableReader& reader, const char* key, double radius, const Doma
   }
 }
 
+void requireRest(TableReader& reader, const Body<double>& body) {
+  const auto require = [&](const char* key, const Vector3<double>& value) {
+    if (body.fixed && value != Vector3<double>::Zero()) {
+      reader.fault(key, detail::formatVector(value),
+                   "none on a \"fixed\" body, which never moves, nor turns");
+    }
+  };
+  require("velocity", body.velocity);
+  require("angularVelocity", body.angularVelocity);
+}
+
 void readBody(TableReader& reader, const Domain<double>& domain, std::vector<SceneBody>& bodies) {
   SceneBody entry;
   Body<double>& body = entry.body;
@@ -103,6 +114,7 @@ void readBody(TableReader& reader, const Domain<double>& domain, std::vector<Sce
     body.inertia = inertia;
   }
   reader.flag("fixed", body.fixed);
+  requireRest(reader, body);
   readLook(reader, entry);
   if (reader.isSound()) {
     try {
