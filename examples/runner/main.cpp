@@ -107,11 +107,9 @@ fs::path madeFolder(const fs::path& folder) {
 void noteOverlaps(const Space<double>& space) {
   const Overlaps overlaps = overlapsAtStart(space);
   if (overlaps.bodies > 0) {
-    std::printf(
-        "note: %zu of %zu bodies begin in others or behind walls by more than a tenth of a radius, the "
-        "deepest "
-        "by %.3g radii\n",
-        overlaps.bodies, space.n(), overlaps.deepest);
+    std::printf("note: %zu of %zu bodies begin in others or behind walls, deeper than a tenth of a radius, ",
+                overlaps.bodies, space.n());
+    std::printf("the deepest by %.3g radii\n", overlaps.deepest);
   }
 }
 

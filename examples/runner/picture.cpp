@@ -3,6 +3,7 @@
 #ifdef GRAVEL_RUN_PICTURES
 
 #include <algorithm>
+#include <array>
 #include <new>
 
 #if defined(__GNUC__)
@@ -29,7 +30,50 @@ double quantile(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(k)];
 }
 
-View viewOf(const Scene& scene, const Space<double>& space) {
+/// Where the body is, and its path where there are trails.
+std::vector<Vector3<double>> placesOf(std::size_t i, const Space<double>& space, const Trails& trails) {
+  std::vector<Vector3<double>> places{space.body(i).position()};
+  for (std::size_t k = 0; i < trails.size() && k < trails[i].size(); ++k) {
+    if (trails[i][k].allFinite()) {
+      places.push_back(trails[i][k]);
+    }
+  }
+  return places;
+}
+
+/// The middle of nearly all places: a few bodies that fly off shall not take the eye along.
+Vector3<double> middleOf(const Space<double>& space, const Trails& trails) {
+  std::array<std::vector<double>, 3> coordinates;
+  for (std::size_t i = 0; i < space.n(); ++i) {
+    for (const Vector3<double>& place : placesOf(i, space, trails)) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        coordinates[axis].push_back(place[static_cast<Eigen::Index>(axis)]);
+      }
+    }
+  }
+  Vector3<double> middle;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::vector<double>& x = coordinates[axis];
+    middle[static_cast<Eigen::Index>(axis)] =
+        space.n() < 20 ? 0.5 * (quantile(x, 0.0) + quantile(x, 1.0)) : quantile(x, 0.5);
+  }
+  return middle;
+}
+
+/// Distance from the target within which nearly all bodies and their paths are.
+double reachFrom(const Vector3<double>& target, const Space<double>& space, const Trails& trails) {
+  std::vector<double> reaches;
+  for (std::size_t i = 0; i < space.n(); ++i) {
+    double reach = 0.0;
+    for (const Vector3<double>& place : placesOf(i, space, trails)) {
+      reach = std::max(reach, (place - target).norm());
+    }
+    reaches.push_back(reach + space.body(i).radius());
+  }
+  return quantile(reaches, space.n() < 20 ? 1.0 : 0.97);
+}
+
+View viewOf(const Scene& scene, const Space<double>& space, const Trails& trails) {
   const PictureOptions& options = scene.picture;
   View view;
   view.up = options.up.normalized();
@@ -38,32 +82,16 @@ View viewOf(const Scene& scene, const Space<double>& space) {
   view.height = static_cast<int>(options.height);
   view.smallestRadius = options.smallestRadius;
   view.stars = options.stars;
-
-  // The middle and the reach of nearly all bodies: a few that fly off shall not make the rest small.
-  view.target = Vector3<double>::Zero();
-  const std::size_t n = space.n();
-  std::vector<double> values(n);
-  if (options.target) {
-    view.target = *options.target;
-  } else if (n > 0) {
-    for (Eigen::Index axis = 0; axis < 3; ++axis) {
-      for (std::size_t i = 0; i < n; ++i) {
-        values[i] = space.body(i).position()[axis];
-      }
-      view.target[axis] =
-          n < 20 ? 0.5 * (quantile(values, 0.0) + quantile(values, 1.0)) : quantile(values, 0.5);
-    }
-  }
-  double span = 0.0;
+  view.target = options.target ? *options.target : middleOf(space, trails);
+  const double upright = std::tan(view.fieldOfView * pi<double>() / 360.0);
+  double distance = 0.0;
   if (options.span) {
-    span = *options.span;
+    distance = 0.5 * *options.span / upright;
   } else {
-    for (std::size_t i = 0; i < n; ++i) {
-      values[i] = (space.body(i).position() - view.target).norm() + space.body(i).radius();
-    }
-    span = n > 0 ? 2.3 * quantile(values, n < 20 ? 1.0 : 0.97) : 1.0;
+    // Of the narrower side; a ball is seen whole from outside the cone that touches it.
+    const double slope = upright * std::min(1.0, static_cast<double>(view.width) / view.height);
+    distance = reachFrom(view.target, space, trails) * std::max(1.15, std::hypot(1.0, slope)) / slope;
   }
-  const double distance = span / (2.0 * std::tan(view.fieldOfView * pi<double>() / 360.0));
   view.eye = view.target + options.direction.normalized() * (distance > 0.0 ? distance : 1.0);
   return view;
 }
@@ -73,7 +101,7 @@ View viewOf(const Scene& scene, const Space<double>& space) {
 bool writePicture(const std::filesystem::path& path, const Scene& scene, const Space<double>& space,
                   const Trails& trails) {
   Picture picture;
-  picture.view = viewOf(scene, space);
+  picture.view = viewOf(scene, space, trails);
   double top = -std::numeric_limits<double>::infinity();  // of the bodies: no wall is drawn higher
   for (std::size_t i = 0; i < space.n(); ++i) {
     const auto body = space.body(i);

@@ -131,7 +131,9 @@ class Renderer {
 
   void addSphere(const DrawnSphere& s) {
     const Vector3<double> centre = local(s.centre);
-    const double radius = std::max(s.radius / unit_, view_.smallestRadius * pixelAt(centre));
+    constexpr double pointSize = 1.5;  // [pixels]
+    const double least = s.radius > 0.0 ? view_.smallestRadius : std::max(view_.smallestRadius, pointSize);
+    const double radius = std::max(s.radius / unit_, least * pixelAt(centre));
     const auto add = [&](void* look, double r) { rt_sphere(scene(), look, vectorOf(centre), r); };
     if (s.surface == Surface::Glowing) {
       add(texture(s.colour, 1.0, 0.0), radius);

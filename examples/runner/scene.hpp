@@ -47,8 +47,8 @@ struct OutputOptions {
 struct PictureOptions {
   Vector3<double> direction = Vector3<double>(1.0, -0.6, 0.5);  ///< from the scene to the eye
   Vector3<double> up = Vector3<double>::UnitZ();
-  std::optional<Vector3<double>> target;  ///< else the middle of the bodies
-  std::optional<double> span;             ///< height of what is seen; else so that nearly all bodies are
+  std::optional<Vector3<double>> target;  ///< else the middle of the bodies and their trails
+  std::optional<double> span;             ///< height of what is seen; else so that nearly all of these are
   double fieldOfView = 30.0;
   std::size_t width = 1200;
   std::size_t height = 900;
