@@ -282,9 +282,10 @@ void readPlane(TableReader& reader, const SimulationConfig<double>& config, std:
 bool readBox(TableReader& reader, const SimulationConfig<double>& config, std::vector<ScenePlane>& planes) {
   static const std::vector<std::string> faces{"-x", "+x", "-y", "+y", "-z", "+z"};
   Vector3<double> low = Vector3<double>::Constant(-1), high = Vector3<double>::Constant(1);
-  if (!reader.vector("low", low) || !reader.vector("high", high)) {
+  const bool hasLow = reader.vector("low", low), hasHigh = reader.vector("high", high);
+  if (!reader.has("low") || !reader.has("high")) {
     reader.missing("\"low\" and \"high\", two opposite corners");
-  } else if (!((high - low).minCoeff() > 0.0)) {
+  } else if (hasLow && hasHigh && !((high - low).minCoeff() > 0.0)) {
     reader.faults().add(reader.where(), "\"high\" in [[box]] is " + detail::formatVector(high) +
                                             "; allowed: more than \"low\", " + detail::formatVector(low) +
                                             ", along each axis");

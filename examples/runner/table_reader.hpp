@@ -125,6 +125,11 @@ class TableReader {
             ? "a whole number, " + std::to_string(least) + " to " + std::to_string(most)
             : "a whole number >= " + std::to_string(least);
     const auto x = node->value_exact<std::int64_t>();
+    if (!x && node->is_floating_point()) {
+      return fault(*node, key,
+                   detail::formatReal(**node->as_floating_point()) + " with a decimal point or an exponent",
+                   allowed + " without either");
+    }
     if (!x) {
       return wrongType(*node, key, allowed);
     }
