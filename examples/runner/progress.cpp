@@ -11,6 +11,9 @@ namespace gravel::runner {
 
 namespace {
 
+/// Columns of a terminal. A line that wraps could not be rewritten: it loses parts from its end.
+constexpr std::size_t narrowest = 80;
+
 bool isTerminal() {
 #if defined(__unix__) || defined(__APPLE__)
   return isatty(STDOUT_FILENO) != 0;
@@ -65,10 +68,13 @@ void Progress::print(const Space<double>& space, double drift, double now) {
   const double rest = duration_ - space.time();
   const std::string left =
       rest <= 0.0 ? "done" : (timeRate_ > 0.0 ? wallTime(rest / timeRate_) + " left" : "starting");
-  const std::string line =
-      format("%5.1f %%  t = %s  step %zu  %zu contacts  energy drift %+.1e  %.0f steps/s  %s",
-             100.0 * space.time() / duration_, sceneTime(space.time(), units_).c_str(), space.steps(),
-             space.contactCount(), drift, rate_, left.c_str());
+  std::string line =
+      format("%5.1f %%  %s  t = %s  step %zu  %zu contacts  drift %+.0e  %.0f steps/s",
+             100.0 * space.time() / duration_, left.c_str(), sceneTime(space.time(), units_).c_str(),
+             space.steps(), space.contactCount(), drift, rate_);
+  while (line.size() >= narrowest && line.rfind("  ") > 0) {
+    line.resize(line.rfind("  "));
+  }
   std::printf(terminal_ ? "\r\x1b[K%s" : "%s\n", line.c_str());
   std::fflush(stdout);
   lastShown_ = now;

@@ -94,6 +94,12 @@ void addOrbits(std::string& text, const Scene& scene, const Space<double>& space
   text += lines.empty() ? "" : "Orbits about " + name(heaviest) + ":\n" + lines;
 }
 
+/// WisdomHolman takes no other step than timeStep, nor does Hermite4, which gives each body steps within it.
+bool hasEqualSteps(const SimulationConfig<double>& config) {
+  return !config.adaptiveTimeStep || config.integrator == IntegratorKind::WisdomHolman ||
+         config.integrator == IntegratorKind::Hermite4;
+}
+
 /// What gravity alone holds: nothing is said where images pull as well, or a field and walls act.
 void addGravity(std::string& text, const Scene& scene, const Space<double>& space, const History& history) {
   const bool alone =
@@ -102,7 +108,8 @@ void addGravity(std::string& text, const Scene& scene, const Space<double>& spac
     return;
   }
   if (space.n() > 20 || history.mostContacts > 0) {
-    text += "Bound by gravity: " + percent(boundFraction(space)) + " of the mass.\n";
+    text += "Bound by gravity: " + percent(boundFraction(space)) +
+            " of the mass, by speeds about the common centre of mass.\n";
   } else {
     addOrbits(text, scene, space);
   }
@@ -170,7 +177,7 @@ std::string summary(const Scene& scene, const Space<double>& space, const Histor
           format(" of %.4g %s together, followed for %s in %s of %s.\n", space.conserved().mass,
                  scene.units.mass.c_str(), sceneTime(space.time(), scene.units).c_str(),
                  counted(space.steps(), "step", "steps").c_str(),
-                 space.config().adaptiveTimeStep ? "changing length" : "equal length");
+                 hasEqualSteps(space.config()) ? "equal length" : "changing length");
   if (facts.begin > 0.0) {
     text += "Taken up at " + sceneTime(facts.begin, scene.units) +
             ": contacts, losses and drift below are those since then.\n";

@@ -26,6 +26,10 @@ std::string inUnit(double x, const std::array<Step, N>& steps) {
 }  // namespace
 
 std::string wallTime(double seconds) {
+  constexpr double year = 365.25 * 86400.0;
+  if (!(seconds < year)) {
+    return format("%.2g years", seconds / year);
+  }
   const auto whole = static_cast<long long>(seconds + 0.5);
   if (whole < 60) {
     return seconds < 10 ? format("%.1f s", seconds) : format("%lld s", whole);
