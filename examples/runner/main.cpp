@@ -104,7 +104,14 @@ fs::path madeFolder(const fs::path& folder) {
   return folder;
 }
 
-void noteOverlaps(const Space<double>& space) {
+/// Says what is to be run, and how many bodies begin where they cannot stay.
+void announce(const Scene& scene, const Space<double>& space, bool isRestart) {
+  std::printf("%s: %s, %s\n", scene.title.empty() ? scene.name.c_str() : scene.title.c_str(),
+              counted(space.n(), "body", "bodies").c_str(), sceneTime(scene.duration, scene.units).c_str());
+  if (isRestart) {
+    std::printf("taken up at %s, step %zu\n", sceneTime(space.time(), scene.units).c_str(), space.steps());
+    return;
+  }
   const Overlaps overlaps = overlapsAtStart(space);
   if (overlaps.bodies > 0) {
     std::printf("note: %zu of %zu bodies begin in others or behind walls, deeper than a tenth of a radius, ",
@@ -135,6 +142,19 @@ void claim(const fs::path& folder) {
 #else
   static_cast<void>(folder);
 #endif
+}
+
+/// What an earlier run said at its end is not of this one, which may end without a word.
+void removeEnds(const fs::path& folder, const std::string& sceneName) {
+  for (const fs::path& last :
+       {fs::path("summary.txt"), fs::path("picture.png"), "frames" / fs::path(sceneName + ".pvd")}) {
+    std::error_code error;
+    fs::remove(folder / last, error);
+    if (error) {
+      throw std::runtime_error("cannot write to the output folder " + folder.string() + ": " +
+                               error.message());
+    }
+  }
 }
 
 /// What is to be done at evenly spaced times; done at the first step at or after each, so that what is
@@ -220,13 +240,7 @@ int run(const Options& options) {
   const double begin = space.time();
   const bool talks = !options.quiet;
   if (talks || options.check) {
-    std::printf("%s: %s, %s\n", scene.title.empty() ? scene.name.c_str() : scene.title.c_str(),
-                counted(space.n(), "body", "bodies").c_str(), sceneTime(scene.duration, scene.units).c_str());
-    if (isRestart) {
-      std::printf("taken up at %s, step %zu\n", sceneTime(space.time(), scene.units).c_str(), space.steps());
-    } else {
-      noteOverlaps(space);
-    }
+    announce(scene, space, isRestart);
   }
   if (options.check) {
     return 0;
@@ -240,16 +254,7 @@ int run(const Options& options) {
   if (!options.save.empty()) {
     prepareFile(options.save);
   }
-  // What an earlier run said at its end is not of this one, which may end without a word.
-  for (const fs::path& last :
-       {fs::path("summary.txt"), fs::path("picture.png"), "frames" / fs::path(scene.name + ".pvd")}) {
-    std::error_code error;
-    fs::remove(folder / last, error);
-    if (error) {
-      throw std::runtime_error("cannot write to the output folder " + folder.string() + ": " +
-                               error.message());
-    }
-  }
+  removeEnds(folder, scene.name);
   Diagnostics diagnostics(folder / "diagnostics.csv");
   std::optional<VtkSeries> series;
   if (scene.output.frames > 0) {
