@@ -70,7 +70,13 @@ class PositionalCorrection {
           const ContactColoring::Row& place = colouring.rows()[k];
           return watch_.isStale(k, place.slot1, place.slot2);
         };
-        detail::forGroupsOf<S>(colouring, begin, end, stale, [&](const Group& group) {
+        const auto fetch = [&](std::size_t k) __attribute__((always_inline)) {
+          const ContactColoring::Row& place = colouring.rows()[k];
+          detail::prefetch(contacts[place.contact]);
+          detail::prefetch(shifts_[place.slot1]);
+          detail::prefetch(shifts_[place.slot2]);
+        };
+        detail::forGroupsOf<S>(colouring, begin, end, stale, fetch, [&](const Group& group) {
           openAll(contacts, colouring, group, settings, [&](const Pack& missing, const Pack& loss) {
             sum += {missing.largest(), loss.sum()};
           });

@@ -53,21 +53,41 @@ struct RowGroup {
   bool holds(std::size_t lane) const { return lane < count; }
 };
 
-/// Calls f(group) for those rows k of [begin, end) of which `wanted(k)`; they share no movable body.
+/// Calls f(group) for those rows k of [begin, end) of which `wanted(k)`; they share no movable body. Before
+/// that, while the group before is dealt with, fetch(k) may ask for what such a row needs (inlined, or a
+/// compiler finds that it does nothing).
+template <Real S, class Wanted, class Fetch, class F>
+void forGroupsOf(const ContactColoring& colouring, std::size_t begin, std::size_t end, Wanted&& wanted,
+                 Fetch&& fetch, F&& f) {
+  RowGroup<S> group;
+  RowGroup<S> next;
+  for (std::size_t k = begin; k < end; ++k) {
+    if (wanted(k)) {
+      fetch(k);
+      next.add(colouring.rows(), k);
+    }
+    if (next.count == next.width) {
+      if (group.count > 0) {
+        f(group);
+      }
+      group = next;
+      next.count = 0;
+    }
+  }
+  if (group.count > 0) {
+    f(group);
+  }
+  if (next.count > 0) {
+    next.fill(colouring.staticSlot());
+    f(next);
+  }
+}
+
 template <Real S, class Wanted, class F>
 void forGroupsOf(const ContactColoring& colouring, std::size_t begin, std::size_t end, Wanted&& wanted,
                  F&& f) {
-  RowGroup<S> group;
-  for (std::size_t k = begin; k < end; ++k) {
-    if (wanted(k)) {
-      group.add(colouring.rows(), k);
-    }
-    if (group.count == group.width || (k + 1 == end && group.count > 0)) {
-      group.fill(colouring.staticSlot());
-      f(group);
-      group.count = 0;
-    }
-  }
+  forGroupsOf<S>(
+      colouring, begin, end, wanted, [](std::size_t /*row*/) {}, f);
 }
 
 /// The scalars of an object that is made of them, from the quad of that number on.
