@@ -46,6 +46,9 @@ void readSimulation(TableReader& reader, SimulationConfig<double>& config) {
       }
     }
   });
+  if (reader.has("coeffFriction") && !reader.has("coeffStaticFriction")) {
+    config.coeffStaticFriction = config.coeffFriction;
+  }
   if (reader.isSound()) {
     try {
       config.validate();
@@ -241,7 +244,9 @@ void readMaterial(TableReader& reader, const SimulationConfig<double>& config, S
   }
   reader.real("restitution", material.restitution, unit);
   reader.real("friction", material.kineticFriction, notNegative());
-  material.staticFriction = std::max(material.staticFriction, material.kineticFriction);
+  if (reader.has("friction")) {
+    material.staticFriction = material.kineticFriction;
+  }
   if (reader.real("staticFriction", material.staticFriction, notNegative()) &&
       material.staticFriction < material.kineticFriction) {
     reader.faults().add(reader.where(), "\"staticFriction\" is " +

@@ -15,7 +15,8 @@ struct Material {
   /// [1], 0 … 1: speed of departure over speed of approach along the normal. 1 keeps the energy. With a
   /// restitutionExponent this is its largest value, see `restitutionAt`.
   Scalar restitution = Scalar(0.5);
-  /// [1], >= kineticFriction: a contact sticks while that takes at most this times the normal impulse.
+  /// [1], >= kineticFriction: a contact sticks while that takes at most this times the normal impulse. What
+  /// is smooth has 0 of both.
   Scalar staticFriction = Scalar(0.4);
   /// [1], >= 0: a sliding contact feels this times the normal impulse against its slip.
   Scalar kineticFriction = Scalar(0.3);
