@@ -153,12 +153,20 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
     }
   };
   const bool works = static_cast<bool>(force_.hook);
+  const bool driftsFreely =
+      apart || !(hasSeveralDrifts() || frame.turns() || orbits_.moves(this->config_.integrator));
   if (works) {
     if (part == 0 || apart) {
-      force_.hookWork.begin(bodies_, force_.hookForces());
+      force_.hookWork.begin(bodies_, force_.hookForces(), driftsFreely);
     }
     force_.hookWork.depart(bodies_);
   }
+  const auto bendWay = [&] {
+    if (works && !(contacts().empty() && impacts().empty())) {
+      force_.hookWork.bend();
+    }
+  };
+  bendWay();
   const char* const alone = contact_.reasonToSkip(bodies_);
   const bool quiet = hasSeveralDrifts() && !apart;
   const Departure departure{this,
@@ -202,6 +210,7 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
   contact_.drivePlanes(halves(2 * part + 2));
   resolveCollisions();
   const bool anew = !last && !merges.empty();  // forces are found once more
+  bendWay();
   if (works && (!held || anew)) {
     left_.work -= force_.hookWork.end(bodies_, force_.hookForces());
   }
@@ -213,7 +222,7 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
     force_.evaluate(bodies_, getG(), this->config_.softening, contact_.domain, Scalar(time_ + end),
                     profiler_);
     if (works) {
-      force_.hookWork.begin(bodies_, force_.hookForces());
+      force_.hookWork.begin(bodies_, force_.hookForces(), driftsFreely);
     }
   }
 }
