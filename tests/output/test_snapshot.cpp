@@ -175,6 +175,14 @@ TEST_CASE("A file is written through links to where they lead, and into what is 
   out.write(link.path());
   CHECK(std::filesystem::is_symlink(link.path()));
   CHECK(SnapshotReader(file.path()).value<double>("x") == 1.5);
+  std::filesystem::remove(file.path());  // the link leads nowhere now
+  detail::writeFileWhole(link.path(), "anew");
+  CHECK(std::filesystem::is_symlink(link.path()));
+  CHECK(file.bytes() == std::vector<char>{'a', 'n', 'e', 'w'});
+  const TemporaryFile loop("loop");
+  std::filesystem::create_symlink(loop.path(), loop.path());
+  CHECK_THROWS_WITH(detail::writeFileWhole(loop.path(), "x"), ContainsSubstring("symbolic link"));
+  CHECK(std::filesystem::is_symlink(loop.path()));
 
   const TemporaryFile pipe("pipe");
   REQUIRE(mkfifo(pipe.path().c_str(), 0600) == 0);

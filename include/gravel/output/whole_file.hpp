@@ -39,6 +39,15 @@ inline std::error_code writeParts(const std::filesystem::path& path, const FileP
   return error;
 }
 
+/// Where links lead, whether it is there or not; a link where there is no end of them.
+inline std::filesystem::path targetOf(std::filesystem::path path) {
+  std::error_code error;
+  for (int links = 0; links < 40 && std::filesystem::is_symlink(path, error); ++links) {
+    path = path.parent_path() / std::filesystem::read_symlink(path, error);
+  }
+  return path;
+}
+
 /// Writes a whole file beside its place and moves it there, so that a reader never sees half of one, and what
 /// was there stays if it cannot be written. Through links to where they lead; what is no file, a device or a
 /// pipe, is written to as it is.
@@ -52,13 +61,14 @@ inline void writeFileWhole(const std::filesystem::path& path, std::string_view h
   if (fs::exists(place) && !fs::is_regular_file(place) && !fs::is_directory(place)) {
     error = writeParts(path, parts);
   } else {
-    const fs::path target = fs::exists(place) ? fs::canonical(path, error) : path;
+    const fs::path target = targetOf(path);
     const fs::path partial = target.string() + ".part";
-    error = writeParts(partial, parts);
+    std::error_code ignored;
+    error = fs::is_symlink(target, ignored) ? make_error_code(std::errc::too_many_symbolic_link_levels)
+                                            : writeParts(partial, parts);
     if (!error) {
       fs::rename(partial, target, error);
     }
-    std::error_code ignored;
     if (error && !fs::is_directory(partial, ignored)) {
       fs::remove(partial, ignored);
     }
