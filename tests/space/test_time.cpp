@@ -89,6 +89,26 @@ TEST_CASE("Adaptive steps shorten for a fast approach, keep to their limits, and
   CHECK_THAT(slow.getPreviousTimeStep(), WithinRel(0.025, 1e-12));  // a quarter of a radius at 5 m/s
 }
 
+// Seen to fail: the next step as long as the longest.
+TEST_CASE("A new longest step between adaptive ones limits the next, and does not lengthen it") {
+  SimulationConfig<double> config;
+  config.G = 1.0;
+  config.timeStep = 0.5;
+  Space<double> space(config);
+  space.addBody(at({-0.5, 0, 0}, {0, -0.5, 0}, 0));
+  space.addBody(at({0.5, 0, 0}, {0, 0.5, 0}, 0));
+  for (std::size_t i = 0; i < 10; ++i) {
+    space.computeDynamics(i);
+  }
+  const double chosen = space.getTimeStep();
+  REQUIRE(chosen < 0.1);
+  space.setTimeStep(2.0);
+  CHECK(space.getTimeStep() == chosen);
+  CHECK(space.config().timeStep == 2.0);
+  space.setTimeStep(chosen / 2);
+  CHECK(space.getTimeStep() == chosen / 2);
+}
+
 TEST_CASE("Diagnostics log energies every logFrequency steps, to where the user says") {
   SimulationConfig<double> config = quiet(0.5);
   config.diagnosticsEnabled = true;

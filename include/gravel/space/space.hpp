@@ -158,7 +158,7 @@ class Space : public Settings<Scalar> {
   /// every body a step of its own; 0 with others.
   std::uint64_t individualSteps() const { return orbits_.individualSteps(); }
   Scalar getTimeStep() const { return dt_; }
-  /// The next step; where steps adapt, also the longest one from now on.
+  /// The next step; where steps adapt, the longest one from now on, so that the next one is not longer.
   void setTimeStep(Scalar dt);
   Scalar getPreviousTimeStep() const { return previous_dt_; }
   /// Parts of the last step, each with its own contacts: config().contactSubsteps, or what was chosen; by an

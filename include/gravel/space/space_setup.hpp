@@ -198,7 +198,7 @@ void Space<Scalar, Layout>::setG(Scalar g) {
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::setTimeStep(Scalar dt) {
   this->assign(&SimulationConfig<Scalar>::timeStep, dt);
-  dt_ = dt;
+  dt_ = this->config_.adaptiveTimeStep && steps_ > 0 ? std::min<Scalar>(dt_, dt) : dt;
 }
 
 /// A change of the potential's law moves energy in or out; the ledger counts it from the first step on.
