@@ -34,7 +34,8 @@ double liftEnergy(const Space<double>& space) {
 /// nothing it is measured against what there was without it.
 double energyInPlay(const EnergyLedger<double>& first, const EnergyLedger<double>& now) {
   const double had = first.kinetic + first.rotational + std::abs(first.potential);
-  const double exchanged = std::abs(now.dissipated() - now.correction);
+  const double exchanged =
+      std::abs((now.dissipated() - now.correction) - (first.dissipated() - first.correction));
   const double potential = std::abs(now.potential);
   return potential + std::min(now.kinetic + now.rotational, had + potential + exchanged);
 }

@@ -23,6 +23,16 @@ struct History {
   std::size_t parts = 0;  ///< of these, each with its own contacts
   std::size_t mostParts = 0;
 
+  /// What was taken since the first row, term by term. The ledger counts from the start of the scene: that of
+  /// a run that is taken up holds what the earlier part lost.
+  EnergyLedger<double> taken() const {
+    EnergyLedger<double> e;
+    e.restitution = last.restitution - first.restitution;
+    e.friction = last.friction - first.friction;
+    e.damping = last.damping - first.damping;
+    e.correction = last.correction - first.correction;
+    return e;
+  }
   /// How far the ledger's total is from its start, over the energy in play; infinite where there was none.
   double drift() const {
     const double moved = last.total() - first.total();

@@ -122,20 +122,21 @@ void addLosses(std::string& text, const History& h) {
     double energy;
     const char* what;
   };
-  const std::array<Part, 3> parts{Part{h.last.restitution, "inelastic hits"},
-                                  Part{h.last.friction, "friction"}, Part{h.last.damping, "damping"}};
-  double taken = 0.0;
+  const EnergyLedger<double> taken = h.taken();
+  const std::array<Part, 3> parts{Part{taken.restitution, "inelastic hits"}, Part{taken.friction, "friction"},
+                                  Part{taken.damping, "damping"}};
+  double lost = 0.0;
   for (const Part& part : parts) {
-    taken += std::max(part.energy, 0.0);
+    lost += std::max(part.energy, 0.0);
   }
   std::string list;
   for (const Part& part : parts) {
-    if (part.energy > 5e-4 * taken) {
+    if (part.energy > 5e-4 * lost) {
       list +=
-          format(list.empty() ? " %s took %.1f %%" : ", %s %.1f %%", part.what, 100.0 * part.energy / taken);
+          format(list.empty() ? " %s took %.1f %%" : ", %s %.1f %%", part.what, 100.0 * part.energy / lost);
     }
   }
-  if (taken > 1e-12 * h.inPlay) {
+  if (lost > 1e-12 * h.inPlay) {
     text += "Of the energy that was lost," + list + ".\n";
   }
   for (const Part& part : parts) {
@@ -143,9 +144,9 @@ void addLosses(std::string& text, const History& h) {
       text += capital(part.what) + format(" put in %.1e of the energy in play.\n", -part.energy / h.inPlay);
     }
   }
-  if (std::abs(h.last.correction) > 1e-6 * h.inPlay) {
+  if (std::abs(taken.correction) > 1e-6 * h.inPlay) {
     text += format("Pushing overlaps apart %s %.1e of the energy in play.\n",
-                   h.last.correction < 0.0 ? "put in" : "took", std::abs(h.last.correction) / h.inPlay);
+                   taken.correction < 0.0 ? "put in" : "took", std::abs(taken.correction) / h.inPlay);
   }
 }
 

@@ -2,7 +2,8 @@
 # check_restart.sh <gravel-run> <folder>
 #
 # A run that ends halfway, or is stopped by Ctrl-C somewhere, and is taken up again ends with the same bits as one in
-# one go: the saved state, the last frame and the energies of the last row. States that do not fit are refused.
+# one go: the saved state, the last frame and the energies of the last row. States that do not fit are refused. The
+# summary tells the losses of the part after the restart alone.
 set -u
 rm -rf "$2"
 mkdir -p "$2"
@@ -18,6 +19,19 @@ high = [0.05, 0.05, 1]
 count = 150
 base = [0, 0, 0.01]
 radius = 0.03
+end
+cat >"$2/ball.toml" <<'end'
+duration = 3
+simulation = {G = 0, timeStep = 0.0009765625, adaptiveTimeStep = false, coeffRestitution = 0}
+field.acceleration = [0, 0, -9.81]
+output.frames = 0
+[[plane]]
+normal = [0, 0, 1]
+friction = 0.5
+[[body]]
+position = [0, 0, 1]
+radius = 0.1
+mass = 1
 end
 sed 's/G = 0/G = 1/' "$2/grains.toml" >"$2/other_settings.toml"
 sed 's/count = 150/count = 151/' "$2/grains.toml" >"$2/other_bodies.toml"
@@ -65,6 +79,11 @@ wait $process
 [ $? -eq 130 ] || { echo "the run was not stopped"; exit 1; }
 go grains continued --restart "$folder/stopped.gravel" || exit 1
 same continued
+
+go ball resting --duration 2 || exit 1
+grep -q "inelastic hits took 100" "$folder/resting/summary.txt" || { echo "the fall has no losses"; exit 1; }
+go ball rested --restart "$folder/resting.gravel" || exit 1
+grep "was lost\|put in" "$folder/rested/summary.txt" && { echo "a ball that rests has losses"; exit 1; }
 
 refuses 2 "state of another scene: it has 150 bodies, the scene 151" other_bodies --restart "$folder/half.gravel"
 refuses 2 "state of another scene: its G is 0, the scene's 1" other_settings --restart "$folder/half.gravel"
