@@ -1,6 +1,12 @@
 #include "restart.hpp"
 #include "text.hpp"
 
+#include <algorithm>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
 namespace gravel::runner {
 
 namespace {
@@ -20,21 +26,36 @@ std::vector<std::pair<std::string, std::string>> settingsOf(const SimulationConf
   return list;
 }
 
+/// By all that a run leaves as it is.
 bool areAlike(const Space<double>& a, const Space<double>& b, std::size_t i) {
   return a.body(i).id() == b.body(i).id() && a.body(i).mass() == b.body(i).mass() &&
-         a.body(i).radius() == b.body(i).radius() && a.body(i).isFixed() == b.body(i).isFixed();
+         a.body(i).radius() == b.body(i).radius() && a.body(i).inertia() == b.body(i).inertia() &&
+         a.body(i).isFixed() == b.body(i).isFixed() && a.body(i).material() == b.body(i).material();
 }
 
-/// What of a saved state does not belong to the scene that starts as `start`; empty if all does.
-std::string misfit(const Space<double>& start, const Space<double>& saved) {
+/// The same surfaces that move alike. The offset counts where nothing moves the plane along its normal: one
+/// that travels is elsewhere by now.
+bool areAlike(const Space<double>& a, const Plane<double>& ofA, const Space<double>& b,
+              const Plane<double>& ofB) {
+  const bool travels = ofA.normal.dot(ofA.velocity) != 0.0;
+  return ofA.normal == ofB.normal && ofA.velocity == ofB.velocity && (travels || ofA.offset == ofB.offset) &&
+         ofA.material == ofB.material && a.material(ofA.material) == b.material(ofB.material);
+}
+
+std::string misfitOfBodies(const Space<double>& start, const Space<double>& saved) {
   if (saved.n() != start.n()) {
     return "it has " + counted(saved.n(), "body", "bodies") + ", the scene " + std::to_string(start.n());
   }
   for (std::size_t i = 0; i < start.n(); ++i) {
     if (!areAlike(start, saved, i)) {
-      return "mass, radius or \"fixed\" of its body " + std::to_string(i) + " is not the scene's";
+      return "mass, radius, inertia, material or \"fixed\" of its body " + std::to_string(i) +
+             " is not the scene's";
     }
   }
+  return {};
+}
+
+std::string misfitOfSettings(const Space<double>& start, const Space<double>& saved) {
   SimulationConfig<double> config = start.config();
   if (config.adaptiveTimeStep) {  // a run keeps its longest step within its duration
     config.timeStep = std::min(config.timeStep, saved.config().timeStep);
@@ -46,9 +67,29 @@ std::string misfit(const Space<double>& start, const Space<double>& saved) {
       return "its " + found[k].first + " is " + found[k].second + ", the scene's " + asked[k].second;
     }
   }
+  return {};
+}
+
+std::string misfitOfSurroundings(const Space<double>& start, const Space<double>& saved) {
   if (!(saved.domain() == start.domain()) || saved.uniformField() != start.uniformField() ||
       saved.planes().size() != start.planes().size()) {
     return "its domain, field or planes are not the scene's";
+  }
+  for (std::size_t k = 0; k < start.planes().size(); ++k) {
+    if (!areAlike(start, start.planes()[k], saved, saved.planes()[k])) {
+      return "normal, place, velocity or material of its plane " + std::to_string(k) + " is not the scene's";
+    }
+  }
+  return {};
+}
+
+/// What of a saved state does not belong to the scene that starts as `start`; empty if all does.
+std::string misfit(const Space<double>& start, const Space<double>& saved) {
+  for (const auto look : {misfitOfBodies, misfitOfSettings, misfitOfSurroundings}) {
+    const std::string found = look(start, saved);
+    if (!found.empty()) {
+      return found;
+    }
   }
   return {};
 }

@@ -33,6 +33,9 @@ position = [0, 0, 1]
 radius = 0.1
 mass = 1
 end
+sed 's/normal = .*/normal = [0.1, 0, 1]/' "$2/ball.toml" >"$2/other_normal.toml"
+sed 's/friction = .*/friction = 0.25/' "$2/ball.toml" >"$2/other_surface.toml"
+sed 's/mass = 1/mass = 1\ninertia = 1/' "$2/ball.toml" >"$2/other_inertia.toml"
 sed 's/G = 0/G = 1/' "$2/grains.toml" >"$2/other_settings.toml"
 sed 's/count = 150/count = 151/' "$2/grains.toml" >"$2/other_bodies.toml"
 
@@ -87,6 +90,9 @@ grep "was lost\|put in" "$folder/rested/summary.txt" && { echo "a ball that rest
 
 refuses 2 "state of another scene: it has 150 bodies, the scene 151" other_bodies --restart "$folder/half.gravel"
 refuses 2 "state of another scene: its G is 0, the scene's 1" other_settings --restart "$folder/half.gravel"
+refuses 2 "normal, .* of its plane 0 is not the scene's" other_normal --restart "$folder/resting.gravel"
+refuses 2 "or material of its plane 0 is not the scene's" other_surface --restart "$folder/resting.gravel"
+refuses 2 "inertia, .* of its body 0 is not the scene's" other_inertia --restart "$folder/resting.gravel"
 refuses 2 "is the state at time 2; allowed: one before the end, 2" grains --restart "$folder/whole.gravel"
 refuses 1 "grains.toml" grains --restart "$folder/grains.toml"
 refuses 1 "cannot save to .*: it is a folder" grains --save "$folder/whole"
