@@ -189,13 +189,16 @@ class Schedule {
 };
 
 /// Makes one step, or what is left of one until `end`, so that each can be looked at. Which one an adaptive
-/// run begins with, the space finds when it makes it: until then it says the longest that is allowed, and
-/// that is no longer than the run.
+/// run begins with, the space finds when it makes it: until then it says the longest that is allowed. That is
+/// kept within the run for this one step; all later ones may be as long as the scene says, in a run that goes
+/// on from here, too.
 void stepTowards(Space<double>& space, double end) {
   const double rest = end - space.time();
   const bool isChosenLater =
       space.steps() == 0 && space.config().adaptiveTimeStep && space.config().minTimeStep < rest;
-  if (isChosenLater && space.getTimeStep() > rest) {
+  const double longest = space.config().timeStep;
+  const bool isLimited = isChosenLater && longest > rest;
+  if (isLimited) {
     space.setTimeStep(rest);
   }
   // A millionth of a step that would be left is rounding in the sum of steps.
@@ -203,6 +206,9 @@ void stepTowards(Space<double>& space, double end) {
     space.computeDynamics(space.steps());
   } else {
     space.advanceTo(end);
+  }
+  if (isLimited) {
+    space.setTimeStep(longest);
   }
 }
 

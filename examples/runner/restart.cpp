@@ -1,7 +1,6 @@
 #include "restart.hpp"
 #include "text.hpp"
 
-#include <algorithm>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -56,11 +55,7 @@ std::string misfitOfBodies(const Space<double>& start, const Space<double>& save
 }
 
 std::string misfitOfSettings(const Space<double>& start, const Space<double>& saved) {
-  SimulationConfig<double> config = start.config();
-  if (config.adaptiveTimeStep) {  // a run keeps its longest step within its duration
-    config.timeStep = std::min(config.timeStep, saved.config().timeStep);
-  }
-  const auto asked = settingsOf(config);
+  const auto asked = settingsOf(start.config());
   const auto found = settingsOf(saved.config());
   for (std::size_t k = 0; k < asked.size(); ++k) {
     if (asked[k] != found[k]) {

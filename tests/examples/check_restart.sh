@@ -33,6 +33,12 @@ position = [0, 0, 1]
 radius = 0.1
 mass = 1
 end
+cat >"$2/slow.toml" <<'end'
+duration = 2
+simulation = {G = 0, timeStep = 5}
+output.frames = 0
+body = [{mass = 1, velocity = [1, 0, 0]}]
+end
 sed 's/normal = .*/normal = [0.1, 0, 1]/' "$2/ball.toml" >"$2/other_normal.toml"
 sed 's/friction = .*/friction = 0.25/' "$2/ball.toml" >"$2/other_surface.toml"
 sed 's/mass = 1/mass = 1\ninertia = 1/' "$2/ball.toml" >"$2/other_inertia.toml"
@@ -87,6 +93,10 @@ go ball resting --duration 2 || exit 1
 grep -q "inelastic hits took 100" "$folder/resting/summary.txt" || { echo "the fall has no losses"; exit 1; }
 go ball rested --restart "$folder/resting.gravel" || exit 1
 grep "was lost\|put in" "$folder/rested/summary.txt" && { echo "a ball that rests has losses"; exit 1; }
+
+# The longest step is the scene's again after one that the end of the run cut short.
+go slow slow_half --duration 1 || exit 1
+go slow slow_whole --restart "$folder/slow_half.gravel" || exit 1
 
 refuses 2 "state of another scene: it has 150 bodies, the scene 151" other_bodies --restart "$folder/half.gravel"
 refuses 2 "state of another scene: its G is 0, the scene's 1" other_settings --restart "$folder/half.gravel"
