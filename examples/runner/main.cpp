@@ -19,6 +19,7 @@
 #include <filesystem>
 #include <iostream>
 #include <new>
+#include <system_error>
 
 #ifdef _OPENMP
 #include <omp.h>
@@ -120,13 +121,44 @@ void announce(const Scene& scene, const Space<double>& space, bool isRestart) {
   }
 }
 
+/// Why no file could be made beside its place as a whole one is in the end; empty if one could. What is no
+/// regular file, a device or a pipe, is not touched before there is something to write.
+std::string whyNotWritable(const fs::path& file) {
+  if (fs::exists(file) && !fs::is_regular_file(file)) {
+    return {};
+  }
+  const fs::path partial = (fs::exists(file) ? fs::canonical(file) : file).string() + ".part";
+  std::FILE* probe = std::fopen(partial.string().c_str(), "wb");
+  if (probe == nullptr) {
+    return std::error_code(errno, std::generic_category()).message();
+  }
+  std::fclose(probe);
+  fs::remove(partial);
+  return {};
+}
+
 /// Refuses at the start of a run what could not be written at its end.
 void prepareFile(const fs::path& file) {
   if (file.has_parent_path()) {
     madeFolder(file.parent_path());
   }
-  if (fs::is_directory(file)) {
-    throw std::runtime_error("cannot save to " + file.string() + ": it is a folder");
+  const std::string reason = fs::is_directory(file) ? "it is a folder" : whyNotWritable(file);
+  if (!reason.empty()) {
+    throw std::runtime_error("cannot save to " + file.string() + ": " + reason);
+  }
+}
+
+/// Saves the state, but for one whose energies are not finite: from that no run can go on, and what an
+/// earlier one saved stays.
+/// \return the reason if it could not be written: the rest of the output is to come all the same
+std::string saveFailure(const Space<double>& space, const std::string& file, bool isFinite) {
+  try {
+    if (!file.empty() && isFinite) {
+      space.save(file);
+    }
+    return {};
+  } catch (const std::exception& error) {
+    return error.what();
   }
 }
 
@@ -300,10 +332,6 @@ int run(const Options& options) {
   }
   progress.finish(space, diagnostics.history().drift());
 
-  if (!options.save.empty()) {
-    space.save(options.save);
-  }
-
   const RunFacts facts{isStop, begin, progress.seconds(), threadCount()};
   const std::string words = summary(scene, space, diagnostics.history(), facts);
   detail::writeFileWhole(folder / "summary.txt", words);
@@ -324,15 +352,17 @@ int run(const Options& options) {
   if (series) {
     tell("Frames:", series->index().string() + "  (" + std::to_string(series->frames()) + ", for ParaView)");
   }
-  if (!options.save.empty()) {
+  const bool isFinite = diagnostics.history().isFinite;
+  const std::string failure = saveFailure(space, options.save, isFinite);
+  if (!options.save.empty() && isFinite && failure.empty()) {
     tell("State:", options.save);
   }
   onStopSignals(SIG_DFL);  // all but the picture is there
   if (!options.noPicture && writePicture(folder / "picture.png", scene, space, trails)) {
     tell("Picture:", folder / "picture.png");
   }
-  if (!diagnostics.history().isFinite) {
-    throw std::runtime_error(notFinite);
+  if (!isFinite || !failure.empty()) {
+    throw std::runtime_error(isFinite ? failure : notFinite);
   }
   return facts.interrupted ? 130 : 0;
 }

@@ -3,7 +3,8 @@
 #
 # A run that ends halfway, or is stopped by Ctrl-C somewhere, and is taken up again ends with the same bits as one in
 # one go: the saved state, the last frame and the energies of the last row. States that do not fit are refused. The
-# summary tells the losses of the part after the restart alone.
+# summary tells the losses of the part after the restart alone. What cannot be saved is refused at the start where that
+# can be seen, and costs nothing else where it cannot.
 set -u
 rm -rf "$2"
 mkdir -p "$2"
@@ -38,6 +39,12 @@ duration = 2
 simulation = {G = 0, timeStep = 5}
 output.frames = 0
 body = [{mass = 1, velocity = [1, 0, 0]}]
+end
+cat >"$2/not_finite.toml" <<'end'
+duration = 1
+simulation = {G = 0, timeStep = 0.1, adaptiveTimeStep = false}
+output.frames = 0
+body = [{mass = 1e200, velocity = [1e60, 0, 0]}]
 end
 sed 's/normal = .*/normal = [0.1, 0, 1]/' "$2/ball.toml" >"$2/other_normal.toml"
 sed 's/friction = .*/friction = 0.25/' "$2/ball.toml" >"$2/other_surface.toml"
@@ -106,3 +113,13 @@ refuses 2 "inertia, .* of its body 0 is not the scene's" other_inertia --restart
 refuses 2 "is the state at time 2; allowed: one before the end, 2" grains --restart "$folder/whole.gravel"
 refuses 1 "grains.toml" grains --restart "$folder/grains.toml"
 refuses 1 "cannot save to .*: it is a folder" grains --save "$folder/whole"
+
+mkdir "$folder/place.gravel.part"
+refuses 1 "cannot save to .*place.gravel: Is a directory" ball --save "$folder/place.gravel"
+[ ! -e "$folder/refused/summary.txt" ] || { echo "a run began that could not be saved"; exit 1; }
+refuses 1 "energies are not finite" not_finite --save "$folder/not_finite.gravel"
+[ ! -e "$folder/not_finite.gravel" ] || { echo "energies that are not finite were saved"; exit 1; }
+[ -e /dev/full ] || exit 0
+rm "$folder/refused/summary.txt"
+refuses 1 "cannot write /dev/full: " ball --save /dev/full
+[ -e "$folder/refused/summary.txt" ] || { echo "a full disk under the state cost the summary"; exit 1; }
