@@ -215,14 +215,20 @@ double boundFraction(const Space<double>& space) {
   return bound / whole.mass;
 }
 
+namespace {
+
+/// The radius that an overlap of two is measured by: the smaller one, but a point has none to measure by.
+double smallerRadius(double a, double b) { return std::min(a, b) > 0.0 ? std::min(a, b) : std::max(a, b); }
+
+}  // namespace
+
 double deepestOverlap(const Space<double>& space) {
   double deepest = 0.0;
   for (const Contact<double>& contact : space.contacts()) {
-    double radius = space.body(contact.first).radius();
-    if (contact.second != staticPartner) {
-      radius = std::min(radius, static_cast<double>(space.body(contact.second).radius()));
-    }
-    deepest = std::max(deepest, -contact.gap / radius);
+    const double first = space.body(contact.first).radius();
+    const bool isPair = contact.second != staticPartner;
+    const double radius = smallerRadius(first, isPair ? space.body(contact.second).radius() : first);
+    deepest = radius > 0.0 ? std::max(deepest, -contact.gap / radius) : deepest;
   }
   return deepest;
 }
@@ -242,7 +248,7 @@ Overlaps overlapsAtStart(const Space<double>& space) {
   for (const Pair& pair : pairs) {
     const auto a = space.body(pair.first), b = space.body(pair.second);
     const Vector3<double> r = space.domain().minimumImage(b.position() - a.position(), space.time());
-    const double depth = (a.radius() + b.radius() - r.norm()) / std::min<double>(a.radius(), b.radius());
+    const double depth = (a.radius() + b.radius() - r.norm()) / smallerRadius(a.radius(), b.radius());
     note(pair.first, depth);
     note(pair.second, depth);
   }

@@ -79,13 +79,13 @@ Cluster largestCluster(const Space<double>& space);
 /// less than their depth in the potential of all others. Of an open domain. O(N^2).
 double boundFraction(const Space<double>& space);
 
-/// Deepest overlap of two bodies over the smaller radius, at the last step's contacts.
+/// Deepest overlap of two bodies over the smaller radius that is not 0, at the last step's contacts.
 double deepestOverlap(const Space<double>& space);
 
 /// Bodies that begin inside each other or in a wall: they are pushed out, which is seldom what was meant.
 struct Overlaps {
   std::size_t bodies = 0;  ///< that move, and are deeper than a tenth of a radius in others or in walls
-  double deepest = 0.0;    ///< over the smaller radius
+  double deepest = 0.0;    ///< over the smaller radius that is not 0
 };
 Overlaps overlapsAtStart(const Space<double>& space);
 
