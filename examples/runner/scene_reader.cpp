@@ -68,9 +68,11 @@ void readLook(TableReader& reader, SceneBody& look) {
 }
 
 /// A body must fit its periodic box. That of a domain which was not understood counts as open.
-void requireRoom(TableReader& reader, const char* key, double radius, const Domain<double>& domain) {
+/// \param isKnown  the radius is what the file says or its default, not what stands in for one at fault
+void requireRoom(TableReader& reader, const char* key, bool isKnown, double radius,
+                 const Domain<double>& domain) {
   const double most = 0.5 * domain.lengths().minCoeff();
-  if (!domain.isOpen() && radius > most) {
+  if (isKnown && !domain.isOpen() && radius > most) {
     reader.fault(key, detail::formatReal(radius),
                  "at most half an edge of the domain, " + detail::formatReal(most));
   }
@@ -98,7 +100,7 @@ void readBody(TableReader& reader, const Domain<double>& domain, std::vector<Sce
   reader.numbers<4>("orientation", orientation);
   body.orientation.coeffs() = orientation;
   const bool understood = reader.real("radius", body.radius, notNegative()) || !reader.has("radius");
-  requireRoom(reader, "radius", body.radius, domain);
+  requireRoom(reader, "radius", understood, body.radius, domain);
   double density = 0.0;
   const bool hasMass = reader.has("mass");
   const bool hasDensity = reader.has("density");
@@ -165,6 +167,11 @@ std::uint64_t readSeed(TableReader& reader) {
   return seed;
 }
 
+void readBodyRadius(TableReader& reader, std::array<double, 2>& radius, const Domain<double>& domain) {
+  const bool understood = reader.interval("bodyRadius", radius, positive()) || !reader.has("bodyRadius");
+  requireRoom(reader, "bodyRadius", understood, radius[1], domain);
+}
+
 void readCloud(TableReader& reader, const Domain<double>& domain, std::vector<SceneBody>& bodies) {
   scenes::CloudOptions options;
   Vector3<double> position = Vector3<double>::Zero(), velocity = Vector3<double>::Zero();
@@ -173,8 +180,7 @@ void readCloud(TableReader& reader, const Domain<double>& domain, std::vector<Sc
   reader.vector("position", position);
   reader.vector("velocity", velocity);
   reader.real("radius", options.radius, positive());
-  reader.interval("bodyRadius", options.bodyRadius, positive());
-  requireRoom(reader, "bodyRadius", options.bodyRadius[1], domain);
+  readBodyRadius(reader, options.bodyRadius, domain);
   reader.real("sizeExponent", options.sizeExponent, notNegative());
   reader.interval("density", options.density, positive());
   reader.vector("spin", options.spin);
@@ -199,8 +205,7 @@ void readColumn(TableReader& reader, const Domain<double>& domain, std::vector<S
   reader.vector("base", options.base);
   reader.vector("velocity", options.velocity);
   reader.real("radius", options.radius, positive());
-  reader.interval("bodyRadius", options.bodyRadius, positive());
-  requireRoom(reader, "bodyRadius", options.bodyRadius[1], domain);
+  readBodyRadius(reader, options.bodyRadius, domain);
   reader.real("density", options.density, positive());
   SceneBody look;
   readLook(reader, look);
@@ -208,12 +213,14 @@ void readColumn(TableReader& reader, const Domain<double>& domain, std::vector<S
 }
 
 /// Balls of diameter 1 and mass 1 in a cube, which walls on all sides have to hold together.
-void readGas(TableReader& reader, bool enclosed, std::vector<SceneBody>& bodies) {
+void readGas(TableReader& reader, bool enclosed, const Domain<double>& domain,
+             std::vector<SceneBody>& bodies) {
   std::size_t count = 1000;
   double fraction = 0.1;
   reader.count("count", count, 1, mostBodies);
   reader.real("fraction", fraction, {1e-9, 0.3, "0 to 0.3"});
   const std::uint64_t seed = readSeed(reader);
+  requireRoom(reader, "radius", true, 0.5, domain);
   if (!enclosed) {
     const double length = scenes::gasBoxLength(count, fraction);
     reader.missing("walls: give a [domain] of kind \"periodic\" with three lengths of " +
@@ -387,7 +394,7 @@ Scene interpret(const toml::table& table, Faults& faults) {
     reader.text("mass", scene.units.mass);
   });
   top.table("simulation", [&](TableReader& reader) { readSimulation(reader, scene.config); });
-  bool domainIsKnown = true;
+  bool domainIsKnown = !top.has("domain");
   top.table("domain", [&](TableReader& reader) {
     readDomain(reader, scene.domain);
     domainIsKnown = reader.isSound();
@@ -401,7 +408,7 @@ Scene interpret(const toml::table& table, Faults& faults) {
   top.tables("body", [&](TableReader& reader) { readBody(reader, scene.domain, scene.bodies); });
   top.tables("cloud", [&](TableReader& reader) { readCloud(reader, scene.domain, scene.bodies); });
   top.tables("column", [&](TableReader& reader) { readColumn(reader, scene.domain, scene.bodies); });
-  top.tables("gas", [&](TableReader& reader) { readGas(reader, enclosed, scene.bodies); });
+  top.tables("gas", [&](TableReader& reader) { readGas(reader, enclosed, scene.domain, scene.bodies); });
   top.table("output", [&](TableReader& reader) {
     reader.count("frames", scene.output.frames, 0, mostRecords);
     reader.count("rows", scene.output.rows, 0, mostRecords);
