@@ -43,7 +43,8 @@ simulation = {G = 0, timeStep = 0.1, adaptiveTimeStep = false}
 mass = 1e200
 velocity = [1e60, 0, 0]
 ")
-expects(jammed 0 "lost, inelastic hits took 100\\.0 %\\.\nFriction put in [0-9.]+e.[0-9]+ of" "duration = 0.3
+# Eight balls jammed into each other. How much each process takes hangs on rounding; that friction puts in does not.
+expects(jammed 0 "Friction put in [0-9.]+e.[0-9]+ of" "duration = 0.3
 simulation = {G = 0, timeStep = 1e-3, adaptiveTimeStep = false}
 domain = {kind = 'periodic', lengths = [1.2, 1.2, 1.2]}
 body = [
@@ -57,6 +58,9 @@ body = [
   {position = [0.1, -0.1, 0.0], velocity = [-0.2, -0.3, 0.2], radius = 0.5, mass = 1},
 ]
 ")
+if(printed MATCHES "lost,[^\n]* friction ")
+  message(FATAL_ERROR "what friction put in is told as a loss: ${printed}")
+endif()
 # The ball rests at the start and at the end.
 expects(between_rows 0 "All has come to rest: [-+0-9.e]+ of the most kinetic energy seen is left" "duration = 2
 simulation = {G = 0, timeStep = 1e-3, adaptiveTimeStep = false, coeffRestitution = 0}
