@@ -127,7 +127,7 @@ std::string whyNotWritable(const fs::path& file) {
   if (fs::exists(file) && !fs::is_regular_file(file)) {
     return {};
   }
-  const fs::path partial = (fs::exists(file) ? fs::canonical(file) : file).string() + ".part";
+  const fs::path partial = detail::targetOf(file).string() + ".part";
   std::FILE* probe = std::fopen(partial.string().c_str(), "wb");
   if (probe == nullptr) {
     return std::error_code(errno, std::generic_category()).message();

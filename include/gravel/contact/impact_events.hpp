@@ -181,8 +181,8 @@ class ImpactEvents : private detail::ImpactCourses<S> {
       return std::nullopt;
     }
     // All meet at r1 + r2, where the rounding of the root errs the same way in each blow (about 1 the mean of
-    // |n|^2 - 1 is 1.1e-16, and elastic gases gained that): so a multiple that differs is made a unit again,
-    // in planes, too.
+    // |n|^2 - 1 is 1.1e-16, and elastic gases gained that): so a multiple is made a unit again that differs
+    // from blow to blow, also where all are in one plane.
     const S along = Vector3<S>(S(1.37), S(2.51), S(3.78)).dot(touch->normal);
     at.n = detail::safeUnit<S>(Vector3<S>((S(1) + detail::sizeOf<S>(along)) * touch->normal));
     at.distance = touch->distance;

@@ -11,10 +11,12 @@
 #include <gravel/output/whole_file.hpp>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <type_traits>
 #include <vector>
 
@@ -77,7 +79,7 @@ class SnapshotReader {
   explicit SnapshotReader(const std::string& path) : path_(path) {
     std::FILE* file = std::fopen(path.c_str(), "rb");
     if (file == nullptr) {
-      fail("cannot be opened");
+      fail("cannot be opened: " + std::generic_category().message(errno));
     }
     unsigned char block[65536];
     for (std::size_t n = 0; (n = std::fread(block, 1, sizeof block, file)) > 0;) {

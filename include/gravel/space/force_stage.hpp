@@ -133,8 +133,8 @@ class ForceStage {
   /// What the hook gave to the present forces [N], by body; empty without one.
   std::span<const Vector3<Scalar>> hookForces() const { return hookForces_; }
 
-  /// The same, three numbers a body; empty without one, and if it was asked
-  /// for other bodies than these n. For a restart.
+  /// The same, three numbers a body; empty without one, and if it was asked for other bodies than these n.
+  /// For a restart.
   std::vector<Scalar> hookParts(std::size_t n) const {
     std::vector<Scalar> parts;
     for (std::size_t i = 0; hook && hookForces_.size() == n && i < n; ++i) {

@@ -25,11 +25,10 @@ class HookWork {
   using Bodies = gravel::Bodies<Scalar, Layout>;
   using Forces = std::span<const Vector3<Scalar>>;
 
-  /// \param forces [N] at the start, by body; none counts as 0
+  /// \param forces [N] at the start, by body; what is missing counts as 0, as where none were asked for yet
   /// \param free  bodies drift straight ahead, once
   void begin(const Bodies& bodies, Forces forces, bool free) {
     forces_.assign(forces.begin(), forces.end());
-    forces_.resize(bodies.size(), Vector3<Scalar>::Zero());
     ways_.assign(bodies.size(), Vector3<Scalar>::Zero());
     places_.resize(bodies.size());
     power_ = powerOf(bodies, forces_);
@@ -57,7 +56,7 @@ class HookWork {
         byWay_ ? sumOver(bodies, Scalar(0),
                          [&](std::size_t i) {
                            return bodies[i].inverseMass() > Scalar(0)
-                                      ? Scalar(Vector3<Scalar>(forces_[i] + forces[i]).dot(ways_[i]))
+                                      ? Scalar(Vector3<Scalar>(of(forces_, i) + of(forces, i)).dot(ways_[i]))
                                       : Scalar(0);
                          })
                : Scalar(power[0] * time_);
@@ -65,6 +64,10 @@ class HookWork {
   }
 
  private:
+  static Vector3<Scalar> of(Forces forces, std::size_t i) {
+    return i < forces.size() ? forces[i] : Vector3<Scalar>(Vector3<Scalar>::Zero());
+  }
+
   /// Of what is not fixed.
   template <class T, class F>
   static T sumOver(const Bodies& bodies, const T& zero, F&& f) {
@@ -82,11 +85,11 @@ class HookWork {
     using Sums = Eigen::Array<Scalar, 2, 1>;
     return sumOver(bodies, Sums(Sums::Zero()), [&](std::size_t i) {
       const auto body = bodies[i];
-      const auto of = [](bool moves, const Vector3<Scalar>& force, const Vector3<Scalar>& velocity) {
+      const auto product = [](bool moves, const Vector3<Scalar>& force, const Vector3<Scalar>& velocity) {
         return moves ? Scalar(force.dot(velocity)) : Scalar(0);
       };
-      return Sums(of(body.inverseMass() > Scalar(0), forces[i], body.velocity()),
-                  of(body.inverseInertia() > Scalar(0), body.torque(), body.angularVelocity()));
+      return Sums(product(body.inverseMass() > Scalar(0), of(forces, i), body.velocity()),
+                  product(body.inverseInertia() > Scalar(0), body.torque(), body.angularVelocity()));
     });
   }
 
