@@ -64,10 +64,14 @@ Space<double> makeSpace(const Scene& scene) {
   Space<double> space(scene.config);
   space.setDomain(scene.domain);
   space.setUniformField(scene.field);
+  for (const Material<double>& material : scene.materials) {
+    space.addMaterial(material);
+  }
+  for (const auto& [first, second, material] : scene.pairs) {
+    space.setPairMaterial(MaterialId{first}, MaterialId{second}, material);
+  }
   for (const ScenePlane& plane : scene.planes) {
-    const std::size_t number = space.addPlane(
-        plane.normal, plane.offset, plane.material ? space.addMaterial(*plane.material) : defaultMaterial);
-    space.setPlaneVelocity(number, plane.velocity);
+    space.setPlaneVelocity(space.addPlane(plane.normal, plane.offset, plane.material), plane.velocity);
   }
   for (const SceneBody& entry : scene.bodies) {
     space.addBody(entry.body);

@@ -1,6 +1,7 @@
 #include "restart.hpp"
 #include "text.hpp"
 
+#include <set>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -78,9 +79,30 @@ std::string misfitOfSurroundings(const Space<double>& start, const Space<double>
   return {};
 }
 
+/// Bodies and planes are alike by now, so that their materials have the same numbers.
+std::string misfitOfMaterials(const Space<double>& start, const Space<double>& saved) {
+  std::set<MaterialId> used;
+  for (std::size_t i = 0; i < start.n(); ++i) {
+    used.insert(start.body(i).material());
+  }
+  for (const Plane<double>& plane : start.planes()) {
+    used.insert(plane.material);
+  }
+  for (const MaterialId a : used) {
+    for (const MaterialId b : used) {
+      if (!(start.pairMaterial(a, b) == saved.pairMaterial(a, b))) {
+        return "materials " + std::to_string(static_cast<std::uint32_t>(a)) + " and " +
+               std::to_string(static_cast<std::uint32_t>(b)) +
+               " are to each other what they are not in the scene";
+      }
+    }
+  }
+  return {};
+}
+
 /// What of a saved state does not belong to the scene that starts as `start`; empty if all does.
 std::string misfit(const Space<double>& start, const Space<double>& saved) {
-  for (const auto look : {misfitOfBodies, misfitOfSettings, misfitOfSurroundings}) {
+  for (const auto look : {misfitOfBodies, misfitOfSettings, misfitOfSurroundings, misfitOfMaterials}) {
     const std::string found = look(start, saved);
     if (!found.empty()) {
       return found;

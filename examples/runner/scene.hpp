@@ -24,7 +24,7 @@ struct ScenePlane {
   Vector3<double> normal = Vector3<double>::UnitZ();
   double offset = 0.0;
   Vector3<double> velocity = Vector3<double>::Zero();
-  std::optional<Material<double>> material;
+  MaterialId material = defaultMaterial;
   std::optional<Colour> colour;  ///< not drawn without one
 };
 
@@ -65,6 +65,8 @@ struct Scene {
   SimulationConfig<double> config;
   Domain<double> domain = Domain<double>::open();
   Vector3<double> field = Vector3<double>::Zero();
+  std::vector<Material<double>> materials;  ///< but for the space's own, in the order of their MaterialId
+  std::vector<MaterialPair<double>> pairs;
   std::vector<SceneBody> bodies;
   std::vector<ScenePlane> planes;
   OutputOptions output;

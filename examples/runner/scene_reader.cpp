@@ -1,4 +1,5 @@
 #include "../scenes/scenes.hpp"
+#include "material_reader.hpp"
 #include "scene.hpp"
 #include "table_reader.hpp"
 
@@ -58,7 +59,9 @@ void readSimulation(TableReader& reader, SimulationConfig<double>& config) {
   }
 }
 
-void readLook(TableReader& reader, SceneBody& look) {
+/// What a body, or each body of a generator, is made of and looks like.
+void readLook(TableReader& reader, const MaterialReader& materials, SceneBody& look) {
+  look.body.material = materials.named(reader);
   static const std::vector<std::string> surfaces{"rock", "smooth", "striped", "glowing"};
   std::size_t surface = static_cast<std::size_t>(look.surface);
   if (reader.choice("surface", surfaces, surface)) {
@@ -89,7 +92,8 @@ void requireRest(TableReader& reader, const Body<double>& body) {
   require("angularVelocity", body.angularVelocity);
 }
 
-void readBody(TableReader& reader, const Domain<double>& domain, std::vector<SceneBody>& bodies) {
+void readBody(TableReader& reader, const MaterialReader& materials, const Domain<double>& domain,
+              std::vector<SceneBody>& bodies) {
   SceneBody entry;
   Body<double>& body = entry.body;
   reader.text("name", entry.name);
@@ -120,7 +124,7 @@ void readBody(TableReader& reader, const Domain<double>& domain, std::vector<Sce
   }
   reader.flag("fixed", body.fixed);
   requireRest(reader, body);
-  readLook(reader, entry);
+  readLook(reader, materials, entry);
   if (reader.isSound()) {
     try {
       validate(body, entry.name.empty() ? "body " + std::to_string(bodies.size()) : "\"" + entry.name + "\"");
@@ -137,6 +141,7 @@ void append(TableReader& reader, std::vector<SceneBody>& bodies, const SceneBody
     for (const Body<double>& body : made) {
       SceneBody entry = look;
       entry.body = body;
+      entry.body.material = look.body.material;
       validate(body, "body " + std::to_string(bodies.size()));
       bodies.push_back(entry);
     }
@@ -172,7 +177,8 @@ void readBodyRadius(TableReader& reader, std::array<double, 2>& radius, const Do
   requireRoom(reader, "bodyRadius", understood, radius[1], domain);
 }
 
-void readCloud(TableReader& reader, const Domain<double>& domain, std::vector<SceneBody>& bodies) {
+void readCloud(TableReader& reader, const MaterialReader& materials, const Domain<double>& domain,
+               std::vector<SceneBody>& bodies) {
   scenes::CloudOptions options;
   Vector3<double> position = Vector3<double>::Zero(), velocity = Vector3<double>::Zero();
   reader.count("count", options.count, 1, mostBodies);
@@ -187,7 +193,7 @@ void readCloud(TableReader& reader, const Domain<double>& domain, std::vector<Sc
   reader.real("velocityDispersion", options.velocityDispersion, notNegative());
   reader.real("bodySpin", options.bodySpin, notNegative());
   SceneBody look;
-  readLook(reader, look);
+  readLook(reader, materials, look);
   generate(reader, bodies, look, options.count, [&] {
     auto made = scenes::rubbleCloud<double>(options);
     for (Body<double>& body : made) {
@@ -198,7 +204,8 @@ void readCloud(TableReader& reader, const Domain<double>& domain, std::vector<Sc
   });
 }
 
-void readColumn(TableReader& reader, const Domain<double>& domain, std::vector<SceneBody>& bodies) {
+void readColumn(TableReader& reader, const MaterialReader& materials, const Domain<double>& domain,
+                std::vector<SceneBody>& bodies) {
   scenes::ColumnOptions options;
   reader.count("count", options.count, 1, mostBodies);
   options.seed = readSeed(reader);
@@ -208,13 +215,13 @@ void readColumn(TableReader& reader, const Domain<double>& domain, std::vector<S
   readBodyRadius(reader, options.bodyRadius, domain);
   reader.real("density", options.density, positive());
   SceneBody look;
-  readLook(reader, look);
+  readLook(reader, materials, look);
   generate(reader, bodies, look, options.count, [&] { return scenes::grainColumn<double>(options); });
 }
 
 /// Balls of diameter 1 and mass 1 in a cube, which walls on all sides have to hold together.
-void readGas(TableReader& reader, bool enclosed, const Domain<double>& domain,
-             std::vector<SceneBody>& bodies) {
+void readGas(TableReader& reader, const MaterialReader& materials, bool enclosed,
+             const Domain<double>& domain, std::vector<SceneBody>& bodies) {
   std::size_t count = 1000;
   double fraction = 0.1;
   reader.count("count", count, 1, mostBodies);
@@ -229,53 +236,20 @@ void readGas(TableReader& reader, bool enclosed, const Domain<double>& domain,
   }
   SceneBody look;
   look.surface = Surface::Smooth;
-  readLook(reader, look);
+  readLook(reader, materials, look);
   generate(reader, bodies, look, count, [&] { return scenes::randomGas<double>(count, fraction, seed); });
 }
 
-void readMaterial(TableReader& reader, const SimulationConfig<double>& config, ScenePlane& plane) {
-  Material<double> material;
-  material.restitution = config.coeffRestitution;
-  material.kineticFriction = config.coeffFriction;
-  material.staticFriction = std::max(config.coeffStaticFriction, config.coeffFriction);
-  material.tangentialRestitution = config.tangentialRestitution;
-  material.restitutionExponent = config.restitutionExponent;
-  material.restitutionSpeed = config.restitutionSpeed;
-  material.rollingFriction = config.rollingFriction;
-  material.spinningFriction = config.spinningFriction;
-  const Range unit = detail::unitInterval<double>();
-  bool own = false;
-  for (const char* key : {"restitution", "friction", "staticFriction", "tangentialRestitution",
-                          "restitutionExponent", "restitutionSpeed", "rollingFriction", "spinningFriction"}) {
-    own = own || reader.has(key);
-  }
-  reader.real("restitution", material.restitution, unit);
-  reader.real("friction", material.kineticFriction, notNegative());
-  if (reader.has("friction")) {
-    material.staticFriction = material.kineticFriction;
-  }
-  if (reader.real("staticFriction", material.staticFriction, notNegative()) &&
-      material.staticFriction < material.kineticFriction) {
-    reader.faults().add(reader.where(), "\"staticFriction\" is " +
-                                            detail::formatReal(material.staticFriction) +
-                                            "; allowed: at least \"friction\", " +
-                                            detail::formatReal(material.kineticFriction));
-  }
-  reader.real("tangentialRestitution", material.tangentialRestitution, unit);
-  reader.real("restitutionExponent", material.restitutionExponent, unit);
-  reader.real("restitutionSpeed", material.restitutionSpeed, positive());
-  reader.real("rollingFriction", material.rollingFriction, notNegative());
-  reader.real("spinningFriction", material.spinningFriction, notNegative());
-  if (own) {
-    plane.material = material;
-  }
+/// Of a plane or a box: what it is made of, and its colour.
+void readSurface(TableReader& reader, MaterialReader& materials, ScenePlane& plane) {
+  plane.material = materials.surfaceOf(reader);
   Colour colour;
   if (reader.colour("colour", colour)) {
     plane.colour = colour;
   }
 }
 
-void readPlane(TableReader& reader, const SimulationConfig<double>& config, std::vector<ScenePlane>& planes) {
+void readPlane(TableReader& reader, MaterialReader& materials, std::vector<ScenePlane>& planes) {
   ScenePlane plane;
   reader.vector("normal", plane.normal);
   reader.real("offset", plane.offset);
@@ -285,13 +259,13 @@ void readPlane(TableReader& reader, const SimulationConfig<double>& config, std:
   } else {
     plane.normal.stableNormalize();
   }
-  readMaterial(reader, config, plane);
+  readSurface(reader, materials, plane);
   planes.push_back(plane);
 }
 
 /// Up to six planes that look inwards: the faces of the box from `low` to `high`, but for the one in `open`.
 /// True if it is closed on all sides.
-bool readBox(TableReader& reader, const SimulationConfig<double>& config, std::vector<ScenePlane>& planes) {
+bool readBox(TableReader& reader, MaterialReader& materials, std::vector<ScenePlane>& planes) {
   static const std::vector<std::string> faces{"-x", "+x", "-y", "+y", "-z", "+z"};
   Vector3<double> low = Vector3<double>::Constant(-1), high = Vector3<double>::Constant(1);
   const bool hasLow = reader.vector("low", low), hasHigh = reader.vector("high", high);
@@ -307,7 +281,7 @@ bool readBox(TableReader& reader, const SimulationConfig<double>& config, std::v
   reader.choice("open", faces, openFace);
   ScenePlane look;
   reader.vector("velocity", look.velocity);
-  readMaterial(reader, config, look);
+  readSurface(reader, materials, look);
   for (std::size_t face = 0; face < faces.size(); ++face) {
     if (face != openFace) {
       const auto axis = static_cast<Eigen::Index>(face / 2);
@@ -400,15 +374,19 @@ Scene interpret(const toml::table& table, Faults& faults) {
     domainIsKnown = reader.isSound();
   });
   top.table("field", [&](TableReader& reader) { reader.vector("acceleration", scene.field); });
-  top.tables("plane", [&](TableReader& reader) { readPlane(reader, scene.config, scene.planes); });
+  MaterialReader materials(scene);
+  top.tables("material", [&](TableReader& reader) { materials.readMaterial(reader); });
+  top.tables("pair", [&](TableReader& reader) { materials.readPair(reader); });
+  top.tables("plane", [&](TableReader& reader) { readPlane(reader, materials, scene.planes); });
   bool enclosed = !scene.domain.isOpen() || !domainIsKnown;
-  top.tables("box", [&](TableReader& reader) {
-    enclosed = readBox(reader, scene.config, scene.planes) || enclosed;
-  });
-  top.tables("body", [&](TableReader& reader) { readBody(reader, scene.domain, scene.bodies); });
-  top.tables("cloud", [&](TableReader& reader) { readCloud(reader, scene.domain, scene.bodies); });
-  top.tables("column", [&](TableReader& reader) { readColumn(reader, scene.domain, scene.bodies); });
-  top.tables("gas", [&](TableReader& reader) { readGas(reader, enclosed, scene.domain, scene.bodies); });
+  top.tables("box",
+             [&](TableReader& reader) { enclosed = readBox(reader, materials, scene.planes) || enclosed; });
+  top.tables("body", [&](TableReader& reader) { readBody(reader, materials, scene.domain, scene.bodies); });
+  top.tables("cloud", [&](TableReader& reader) { readCloud(reader, materials, scene.domain, scene.bodies); });
+  top.tables("column",
+             [&](TableReader& reader) { readColumn(reader, materials, scene.domain, scene.bodies); });
+  top.tables("gas",
+             [&](TableReader& reader) { readGas(reader, materials, enclosed, scene.domain, scene.bodies); });
   top.table("output", [&](TableReader& reader) {
     reader.count("frames", scene.output.frames, 0, mostRecords);
     reader.count("rows", scene.output.rows, 0, mostRecords);

@@ -174,11 +174,34 @@ class TableReader {
     }
     const auto found = std::find(names.begin(), names.end(), word);
     if (found == names.end()) {
-      faults_.add(table_.get(key)->source(), "\"" + std::string(key) + "\" in " + name_ + " is \"" + word +
-                                                 "\"" + allowedNames(word, names));
-      return false;
+      return unknownName(key, word, names);
     }
     value = static_cast<std::size_t>(found - names.begin());
+    return true;
+  }
+
+  /// Notes that a word under `key` is none of `names`.
+  bool unknownName(const char* key, const std::string& word, const std::vector<std::string>& names) {
+    faults_.add(table_.get(key)->source(), "\"" + std::string(key) + "\" in " + name_ + " is \"" + word +
+                                               "\"" + allowedNames(word, names));
+    return false;
+  }
+
+  /// A list of N texts.
+  template <std::size_t N>
+  bool texts(const char* key, std::array<std::string, N>& value) {
+    const toml::node* node = take(key);
+    if (node == nullptr) {
+      return false;
+    }
+    const toml::array* list = node->as_array();
+    if (list == nullptr || list->size() != N ||
+        !std::all_of(list->begin(), list->end(), [](const auto& n) { return n.is_string(); })) {
+      return wrongType(*node, key, "a list of " + std::to_string(N) + " texts in quotes");
+    }
+    for (std::size_t k = 0; k < N; ++k) {
+      value[k] = list->get(k)->as_string()->get();
+    }
     return true;
   }
 

@@ -34,6 +34,15 @@ position = [0, 0, 1]
 radius = 0.1
 mass = 1
 end
+cat >"$2/pair.toml" <<'end'
+duration = 1
+simulation = {G = 0, timeStep = 0.01, adaptiveTimeStep = false}
+output.frames = 0
+material = [{name = "a"}, {name = "b"}]
+pair = [{materials = ["a", "b"], restitution = 0.5}]
+plane = [{material = "a"}]
+body = [{position = [0, 0, 1], radius = 0.1, mass = 1, material = "b"}]
+end
 cat >"$2/slow.toml" <<'end'
 duration = 2
 simulation = {G = 0, timeStep = 5}
@@ -49,6 +58,7 @@ end
 sed 's/normal = .*/normal = [0.1, 0, 1]/' "$2/ball.toml" >"$2/other_normal.toml"
 sed 's/friction = .*/friction = 0.25/' "$2/ball.toml" >"$2/other_surface.toml"
 sed 's/mass = 1/mass = 1\ninertia = 1/' "$2/ball.toml" >"$2/other_inertia.toml"
+sed 's/restitution = .*/restitution = 0.6}]/' "$2/pair.toml" >"$2/other_pair.toml"
 sed 's/G = 0/G = 1/' "$2/grains.toml" >"$2/other_settings.toml"
 sed 's/count = 150/count = 151/' "$2/grains.toml" >"$2/other_bodies.toml"
 
@@ -110,6 +120,9 @@ refuses 2 "state of another scene: its G is 0, the scene's 1" other_settings --r
 refuses 2 "normal, .* of its plane 0 is not the scene's" other_normal --restart "$folder/resting.gravel"
 refuses 2 "or material of its plane 0 is not the scene's" other_surface --restart "$folder/resting.gravel"
 refuses 2 "inertia, .* of its body 0 is not the scene's" other_inertia --restart "$folder/resting.gravel"
+go pair pair_half --duration 0.5 || exit 1
+go pair pair_whole --restart "$folder/pair_half.gravel" || exit 1
+refuses 2 "materials 1 and 2 are to each other" other_pair --restart "$folder/pair_half.gravel"
 refuses 2 "is the state at time 2; allowed: one before the end, 2" grains --restart "$folder/whole.gravel"
 refuses 1 "grains.toml" grains --restart "$folder/grains.toml"
 refuses 1 "cannot save to .*: it is a folder" grains --save "$folder/whole"
