@@ -106,9 +106,9 @@ TEST_CASE("Bodies that merge between the parts of a step take their share of a u
   CHECK(off < 1e-12 * moved);
 }
 
-// The saved state knows of no force of the user's, or of one that is gone: forces are found anew. Seen to fail:
-// those of the file taken until they are (0.05 m/s in place of 0.20; 0.10 m/s in place of none, and 9 mJ that
-// nothing booked).
+// The saved state knows of no force of the user's, or of one that is gone: forces are found anew. Seen to
+// fail: those of the file taken until they are (0.05 m/s in place of 0.20; 0.10 m/s in place of none, and 9
+// mJ that nothing booked).
 TEST_CASE("A force of the user's that the saved state had not works from the start of the next step on") {
   const TemporaryFile file("hookless");
   Space<double> before = mergers();
