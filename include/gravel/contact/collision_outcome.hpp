@@ -58,7 +58,7 @@ struct CollisionOutcome {
 
   /// As the materials say.
   static CollisionOutcome bounce() { return {}; }
-  /// The two become one body at the end of the step, see `merged()`.
+  /// The two stick to each other, and become one body at the end of the step, see `merged()`.
   static CollisionOutcome merge() { return {.kind = CollisionKind::Merge}; }
   static CollisionOutcome velocities(const Vector3<Scalar>& v1, const Vector3<Scalar>& w1,
                                      const Vector3<Scalar>& v2, const Vector3<Scalar>& w2) {
@@ -137,9 +137,6 @@ Body<Scalar> merged(const Body<Scalar>& a, const Body<Scalar>& b, const Vector3<
                     const Vector3<Scalar>& v_ab,
                     const Vector3<Scalar>& turn = Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(0))) {
   const MassShares<Scalar> share = massShares<Scalar>(a.mass, true, b.mass, true);  // by inverse mass
-  const auto inertiaOf = [](const Body<Scalar>& body) {
-    return Scalar(detail::inertiaFactor(body) * body.mass * body.radius * body.radius);
-  };
   // Relative to the larger radius, that cubes stay in range.
   const Scalar larger = std::max<Scalar>(a.radius, b.radius);
   const Scalar ratio = larger > Scalar(0) ? Scalar(std::min<Scalar>(a.radius, b.radius) / larger) : Scalar(0);
@@ -149,10 +146,8 @@ Body<Scalar> merged(const Body<Scalar>& a, const Body<Scalar>& b, const Vector3<
   one.inertia.reset();
   const bool homogeneous = !a.inertia && !b.inertia;
   const Scalar factor = share.second * detail::inertiaFactor(a) + share.first * detail::inertiaFactor(b);
-  const Scalar inertia =
-      (homogeneous ? detail::homogeneousFactor<Scalar>() : factor) * one.mass * one.radius * one.radius;
   if (!homogeneous && one.mass > Scalar(0) && one.radius > Scalar(0)) {
-    one.inertia = inertia;
+    one.inertia = factor * one.mass * one.radius * one.radius;
   }
   if (a.fixed) {
     return one;
@@ -160,11 +155,23 @@ Body<Scalar> merged(const Body<Scalar>& a, const Body<Scalar>& b, const Vector3<
   // a's share of the motion of b: m_b / (m_a + m_b) is a's share by inverse mass.
   one.position = a.position + share.first * r_ab;
   one.velocity = a.velocity + share.first * v_ab;
-  const Vector3<Scalar> spins = inertiaOf(a) * Vector3<Scalar>(a.angularVelocity + turn) +
-                                inertiaOf(b) * Vector3<Scalar>(b.angularVelocity + turn);
-  const Vector3<Scalar> angular =
-      spins + share.effective * r_ab.cross(Vector3<Scalar>(v_ab + turn.cross(r_ab)));
-  one.angularVelocity = inertia > Scalar(0) ? Vector3<Scalar>(angular / inertia - turn) : a.angularVelocity;
+  if (!(one.radius > Scalar(0))) {
+    return one;
+  }
+  // Angular momentum over m r^2 of the one, which itself leaves the range of a float.
+  const auto spinOf = [&](const Body<Scalar>& body, const Scalar& shareOfMass) {
+    const Scalar x = body.radius / one.radius;
+    return Vector3<Scalar>((shareOfMass * detail::inertiaFactor(body) * x * x) *
+                           Vector3<Scalar>(body.angularVelocity + turn));
+  };
+  const Vector3<Scalar> arm = r_ab / one.radius;
+  const Vector3<Scalar> orbit =
+      share.first * share.second * arm.cross(Vector3<Scalar>(v_ab / one.radius + turn.cross(arm)));
+  const Vector3<Scalar> angular = spinOf(a, share.second) + spinOf(b, share.first) + orbit;
+  const Scalar k = homogeneous ? detail::homogeneousFactor<Scalar>() : factor;
+  if (k > Scalar(0)) {
+    one.angularVelocity = angular / k - turn;
+  }
   return one;
 }
 
