@@ -557,3 +557,29 @@ TEST_CASE("A blow that parts a pile in space keeps momentum and the centre of ma
   CHECK((momentum - m * Vec(0, 10, 0)).norm() < 1e-11 * m);
   CHECK((place - m * Vec(0.4, -4 + 10 * space.time(), 0)).norm() < 1e-11 * m);
 }
+
+// The line of centres at the blow, on the way as it is bent. Seen to fail: that of the straight way of the
+// drift (1.3e-3 m/s at a hundredth of a second), which is for two that move: it exerts no torque on their
+// places.
+TEST_CASE("In a uniform field a bounce off a fixed ball is exact, whatever the step") {
+  const double g = 9.81, reach = 0.2, aside = 0.05, height = 2, e = 0.7;
+  const double up = std::sqrt(reach * reach - aside * aside);
+  const double time = std::sqrt(2 * (height - up) / g);
+  const Vec n(aside / reach, 0, up / reach);
+  const Vec after = Vec(0, 0, -g * time) + (1 + e) * g * time * n[2] * n;
+  for (const double h : {1e-2, 1e-3}) {
+    SimulationConfig<double> config = plain(h);
+    config.coeffRestitution = e;
+    Space<double> space(config);
+    space.setUniformField({0, 0, -g});
+    Body<double> fixed = ball({0, 0, 0}, {0, 0, 0}, 0.1, 1.0);
+    fixed.fixed = true;
+    space.addBody(fixed);
+    space.addBody(ball({aside, 0, height}, {0, 0, 0}, 0.1, 1.0));
+    while (space.time() < time + 0.01) {
+      space.computeDynamics(0);
+    }
+    const Vec expected = after - Vec(0, 0, g * (space.time() - time));
+    CHECK((Vec(space.body(1).velocity()) - expected).norm() < 1e-12);
+  }
+}

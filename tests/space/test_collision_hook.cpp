@@ -97,6 +97,48 @@ TEST_CASE("Two that merge keep all that is kept, and the ledger has what they lo
   }
 }
 
+namespace {
+
+/// How far the ledger is off at most, where two merge that come near each other in steps of `reach` times
+/// their distance when they touch, over their energy of motion then, about 1: head-on to grazing, at all
+/// times within the step.
+double offOfMergers(double reach) {
+  double worst = 0;
+  for (int k = 0; k < 200; ++k) {
+    SimulationConfig<double> config = plain(0.1 * reach);
+    config.G = 1.0;
+    Space<double> space(config);
+    space.addBody(ball({0, 0, 0}, {0, 0, 0}, 0.1, 0.5));
+    space.addBody(ball({0.21 + 0.2 * reach * k / 200, 0.01 * (k % 20), 0}, {-2, 0, 0}, 0.1, 0.5));
+    space.setCollisionHook(mergeAll);
+    const auto before = space.conserved();
+    const double start = space.energyLedger().total();
+    advance(space, 2);
+    if (space.n() == 1) {
+      worst = std::max(worst, std::abs(space.energyLedger().total() - start));
+      const auto after = space.conserved();
+      CHECK((after.momentum - before.momentum).norm() < 1e-14);
+      CHECK((after.angularMomentum - before.angularMomentum).norm() < 1e-14);
+    }
+  }
+  return worst;
+}
+
+}  // namespace
+
+// Second order in the step, as blows are. Seen to fail: two that merge fly on through each other, and may be
+// nearly in one place when they pull each other last (16 and 8e7).
+TEST_CASE("What two that merge lose is right to second order, however far they come in a step") {
+  const double fine = offOfMergers(0.125);
+  const double half = offOfMergers(0.5);
+  const double whole = offOfMergers(1.0);
+  CAPTURE(fine, half, whole);
+  CHECK(half < 0.15);
+  CHECK(whole < 0.6);
+  CHECK(half > 4 * fine);  // 16 at order 2
+  CHECK(half < 64 * fine);
+}
+
 TEST_CASE("Three in a row that meet in one step become one") {
   Space<double> space(bouncy(0.1));
   space.addBody(ball({-1.05, 0, 0}, {3, 0, 0}, 0.5, 1.0));
@@ -133,6 +175,34 @@ TEST_CASE("Velocities of the user's own are what the bodies leave with, at the t
     CHECK((space.body(0).position() - (2 - 1.004) * Vec(1, 0, 2)).norm() < 1e-9);
     CHECK_THAT(space.energyLedger().total(), WithinRel(before, 1e-13));
     CHECK(space.energyLedger().restitution < -2.0);  // put in
+  }
+}
+
+// A law of the user's is one of the space's (see LateBlows). Seen to fail: what the acceleration changes
+// within the step is made up for where materials decide alone (1.8e-3 of energy in 195 bounces of velocity
+// Verlet with steps of 0.01, -1.4 % of it).
+TEST_CASE("The elastic law, given by a hook, bounces under gravity as the material does") {
+  for (const IntegratorKind kind : {IntegratorKind::VelocityVerlet, IntegratorKind::BlanesMoan6}) {
+    std::array<Space<double>, 2> spaces;
+    for (std::size_t k = 0; k < 2; ++k) {
+      SimulationConfig<double> config = plain(0.01);
+      config.G = 1.0;
+      config.integrator = kind;
+      config.coeffRestitution = 1.0;
+      spaces[k] = Space<double>(config);
+      spaces[k].addBody(ball({-1, 0, 0}, {0, 0, 0}, 0.5, 0.5));
+      spaces[k].addBody(ball({1, 0, 0}, {0, 0, 0}, 0.5, 0.5));
+      if (k == 1) {
+        spaces[k].setCollisionHook([](const Hit& hit) {
+          const Vec half = hit.impactSpeed * hit.normal;  // of equal masses
+          return Outcome::velocities(hit.first.velocity - half, hit.first.angularVelocity,
+                                     hit.second.velocity + half, hit.second.angularVelocity);
+        });
+      }
+      advance(spaces[k], 10000);  // some twenty bounces
+    }
+    CHECK((spaces[0].body(0).position() - spaces[1].body(0).position()).norm() < 1e-10);
+    CHECK((spaces[0].body(0).velocity() - spaces[1].body(0).velocity()).norm() < 1e-10);
   }
 }
 

@@ -3,6 +3,7 @@
 /// \file
 /// What the blows of a step do to the courses of bodies.
 
+#include <gravel/contact/collision_outcome.hpp>
 #include <gravel/contact/impact_forecast.hpp>
 #include <gravel/contact/slip_and_turn.hpp>
 
@@ -66,6 +67,46 @@ class ImpactCourses : protected ImpactForecast<S> {
     report.frictionLoss -= moment * Vector3<S>(w - before).dot(Vector3<S>(w + before)) / S(2);
     scene.course.push(scene.bodies, i, S(1), {Vector3<S>(v - side.v), nothing, nothing}, t);
     turn(scene, i, Vector3<S>(scene.course.spinAtStart(w, t)), t);
+  }
+
+  /// [m s^-2] >= 0, by which the distance d of two, 0 to a boundary, falls back: d'' = n.a + v_t^2/d.
+  static S fallsBack(const S& a_n, const S& d, const Vector3<S>& v_t) {
+    const S rate = d > S(0) ? S(a_n + v_t.squaredNorm() / d) : a_n;
+    return rate < S(0) ? S(-rate) : S(0);
+  }
+
+  /// What two that shall merge have until then, as one rigid body with their momentum and angular momentum.
+  /// (In flight through each other they would pull each other at any strength.) About what cannot move: rest.
+  template <class Scene>
+  static CollisionOutcome<S> asOne(const Scene& scene, const ImpactEvent<S>& event,
+                                   const ImpactMeeting<S>& at, const Vector3<S>& v_rel) {
+    const auto& [one, two, n, distance, a_n, drift, lead, material] = at;
+    const MassShares<S> share = massShares<S>(one.mass, one.movable, two.mass, two.movable);
+    CollisionOutcome<S> to;
+    to.angularVelocity1 = scene.spin(event.first, event.t);
+    to.angularVelocity2 = scene.spin(event.second, event.t);
+    Vector3<S> dv = -v_rel;
+    if (share.first > S(0) && share.second > S(0)) {
+      // Moments of inertia over that of the two centres, m_eff d^2.
+      const auto momentOf = [&](std::uint32_t i, const ImpactSide<S>& side, const S& shareOfIt) {
+        const S x = side.r / distance;
+        return S(S(scene.bodies.inertiaFactors()[i]) * x * x / shareOfIt);
+      };
+      const S i1 = momentOf(event.first, one, share.first);
+      const S i2 = momentOf(event.second, two, share.second);
+      const Vector3<S> spins = i1 * to.angularVelocity1 + i2 * to.angularVelocity2;
+      const Vector3<S> about = spins.dot(n) * n;
+      const Vector3<S> across = (spins - about + n.cross(v_rel) / distance) / (i1 + i2 + S(1));
+      const S both = i1 + i2;
+      to.angularVelocity1 = both > S(0) ? Vector3<S>(across + about / both) : across;
+      to.angularVelocity2 = to.angularVelocity1;
+      dv += across.cross(n) * distance;
+    }
+    const S pull = fallsBack(a_n, distance, Vector3<S>(v_rel + dv));
+    dv += (pull * (scene.settings.h - event.t) / S(2)) * n;
+    to.velocity1 = one.v - share.first * dv;
+    to.velocity2 = two.v + share.second * dv;
+    return to;
   }
 
   template <class Scene>

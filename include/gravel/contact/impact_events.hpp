@@ -63,7 +63,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
   /// \param nearWalls  indices of the bodies that may touch a boundary in the step; all without it
   /// \param decide  `decide(impact, material, v1, v2, v_rel)`, asked about each impact of two bodies that is
   ///   faster than what rests, with the velocities of the moment: a `CollisionOutcome`. Two that shall merge
-  ///   fly on through each other for the rest of the step.
+  ///   stick to each other for the rest of the step.
   /// \param support  of bodies that are held: see detail::ImpactScene
   template <ContactBodies B, class Candidates, class Course = StraightCourse<S>, class Decide = NoDecision,
             class Support = NoSupport>
@@ -175,8 +175,11 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     const S& r2 = second.radius;
     // The normal on the straight way of the drift, a h^2/8 at most from the parabola's: the blow then exerts
     // no torque on the drift's own positions, and keeps its angular momentum to rounding.
-    const auto touch = sphereSphere<S>(Vector3<S>(flight.r + flight.v * event.t), r1, r2, event.key1,
-                                       event.key2, scene.settings.epsilon, r1 + r2);
+    // Of one that cannot move there is none to keep.
+    const bool anchored = !detail::isMovable(bodies, event.first) || !detail::isMovable(bodies, event.second);
+    const auto touch =
+        sphereSphere<S>(anchored ? flight.place(event.t) : Vector3<S>(flight.r + flight.v * event.t), r1, r2,
+                        event.key1, event.key2, scene.settings.epsilon, r1 + r2);
     if (!touch) {
       return std::nullopt;
     }
@@ -202,36 +205,31 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     const S& t = event.t;
     const Impact<S> impact{event.first, event.second, event.key1, event.key2, t, speed,
                            n,           distance,     {},         false,      t, true};
-    const CollisionOutcome<S> outcome = decide(impact, material, one.v, two.v, v_rel);
+    CollisionOutcome<S> outcome = decide(impact, material, one.v, two.v, v_rel);
     if (outcome.kind == CollisionKind::Bounce) {
       return false;
     }
     impacts_.push_back(impact);
-    if (outcome.kind == CollisionKind::Merge) {
-      remember(scene, S(0), report, true);
+    const bool merges = outcome.kind == CollisionKind::Merge;
+    if (merges) {
       merges_.emplace_back(event.key1, event.key2);
-      return true;
+      outcome = Base::asOne(scene, event, at, v_rel);
     }
     // Two that part may be driven together again in this step. Those that do not would meet for ever: they
     // are left to the solver of contacts at its end.
     const Vector3<S> v1 = one.movable ? outcome.velocity1 : one.v;
     const Vector3<S> v2 = two.movable ? outcome.velocity2 : two.v;
     const S parting = n.dot(Vector3<S>(v2 - v1 + drift));
-    const bool ends = !(parting > noise);
-    impacts_.back().rests = ends;
-    remember(scene, std::clamp<S>(parting / speed, S(0), S(1)), report, ends);
+    const bool ends = merges || !(parting > noise);
+    impacts_.back().rests = ends && !merges;
+    impacts_.back().parting = merges ? S(0) : parting;
+    remember(scene, std::clamp<S>(impacts_.back().parting / speed, S(0), S(1)), report, ends);
     give(scene, event.first, one, outcome.velocity1, outcome.angularVelocity1, t, report);
     give(scene, event.second, two, outcome.velocity2, outcome.angularVelocity2, t, report);
     const S sheared = two.movable ? S(two.mass * Vector3<S>(v2 - two.v).dot(drift)) : S(0);
     report.restitutionLoss -= sheared;  // both as the first one sees them
     report.driftWork -= sheared;
     return true;
-  }
-
-  /// [m s^-2] >= 0, by which the distance d of two, 0 to a boundary, falls back: d'' = n.a + v_t^2/d.
-  static S fallsBack(const S& a_n, const S& d, const Vector3<S>& v_t) {
-    const S rate = d > S(0) ? S(a_n + v_t.squaredNorm() / d) : a_n;
-    return rate < S(0) ? S(-rate) : S(0);
   }
 
   /// Deals a blow. \return whether a course changed
@@ -247,7 +245,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     const bool boundary = event.second == staticPartner;
     const Vector3<S> v_rel = two.v - one.v + drift;
     const S v_n = n.dot(v_rel);
-    const S pull = fallsBack(a_n, boundary ? S(0) : distance, Vector3<S>(v_rel - v_n * n));
+    const S pull = Base::fallsBack(a_n, boundary ? S(0) : distance, Vector3<S>(v_rel - v_n * n));
     const S noise = S(16) * Eigen::NumTraits<S>::epsilon() * (detail::maxAbs(one.v) + detail::maxAbs(two.v));
     const bool still = !(v_n + lead < -noise);
     const S hop = pull * (h - t) / S(2);

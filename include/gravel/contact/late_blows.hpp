@@ -20,9 +20,9 @@ namespace gravel {
 /// speed u lacks
 ///     du = -n.(a_1 - a_0) (t - h/2)/2
 /// and the pair's parting speed (J_n/m* u) du, which is made up when a_1 is known: along the line of centres
-/// of that moment, for angular momentum's sake. Blows after which a pair is pressed together, those that
-/// somebody else decides about, and friction are left as they are; and so is a pair that has turned by more
-/// than 60 degrees since. In a uniform field a_1 = a_0, and nothing changes.
+/// of that moment, for angular momentum's sake. What somebody else gave the two counts as a share of u as
+/// well. Blows after which a pair is pressed together, and friction, are left as they are; and so is a pair
+/// that has turned by more than 60 degrees since. In a uniform field a_1 = a_0, and nothing changes.
 template <Real S>
 class LateBlows {
  public:
@@ -35,9 +35,9 @@ class LateBlows {
     for (const Impact<S>& impact : impacts) {
       const S apart = pull(bodies, impact);
       const bool stays = impact.rests && !(apart > S(0));
-      if (!stays && !impact.decided && impact.speed > S(0)) {
-        blows_.push_back(
-            {impact.first, impact.second, place, impact.normal, apart, S(start + impact.time), impact.speed});
+      if (!stays && !(impact.decided && impact.rests) && impact.speed > S(0)) {
+        blows_.push_back({impact.first, impact.second, place, impact.normal, apart, S(start + impact.time),
+                          impact.speed, impact.decided, impact.parting});
       }
       ++place;
     }
@@ -69,7 +69,8 @@ class LateBlows {
         continue;
       }
       S& jn = impulseOf(blow.place).normal;
-      const S kept = jn / (share.effective * blow.speed) - S(1);  // coefficient of restitution
+      const S kept = blow.decided ? S(blow.parting / blow.speed)  // coefficient of restitution
+                                  : S(jn / (share.effective * blow.speed) - S(1));
       const S dv = (S(1) + kept) * du;
       if (share.first > S(0)) {
         bodies.velocities()[blow.first] -= Vector3<S>((share.first * dv) * n);
@@ -77,7 +78,9 @@ class LateBlows {
       if (share.second > S(0)) {
         bodies.velocities()[blow.second] += Vector3<S>((share.second * dv) * n);
       }
-      jn += share.effective * dv;
+      if (!blow.decided) {
+        jn += share.effective * dv;
+      }
       loss += share.effective * (S(1) - kept * kept) * blow.speed * du;
     }
     blows_.clear();
@@ -93,6 +96,8 @@ class LateBlows {
     S pull;  ///< [m s^-2] n.(a_2 - a_1) of the two bodies
     S time;  ///< [s]
     S speed;
+    bool decided;  ///< by somebody else, who gave
+    S parting;     ///< [m s^-1] along the normal
   };
 
   template <class B, class Pair>

@@ -90,10 +90,10 @@ class Space : public Settings<Scalar> {
   /// \throws std::out_of_range if no plane has this number
   void removePlane(std::size_t plane);
   /// From now on the plane moves at this velocity [m s^-1]: along its normal it travels, across it drags what
-  /// rubs on it. Set it anew before each step for any motion, V = (x(t + h) - x(t))/h for a given path. Along
-  /// the normal V holds at once; across it the last step's velocity becomes V evenly within the step, but in
-  /// the first step of a new plane, which has V from the start. Of several calls between two steps the last
-  /// one counts. What a moving plane does to bodies is booked in the ledger as `work`.
+  /// rubs on it. Set it anew before each step for any motion x(t): along the normal the mean of the step,
+  /// (x(t + h) - x(t))/h; across it that at its end, x'(t + h), which the last one becomes evenly, but in the
+  /// first step of a new plane, which has V from the start. Of several calls between two steps the last one
+  /// counts. What a moving plane does to bodies is booked in the ledger as `work`.
   /// \throws std::out_of_range as above; std::invalid_argument for a velocity that is not finite
   void setPlaneVelocity(std::size_t plane, const Vector& velocity) {
     this->inStep_.refuse("setPlaneVelocity()");
