@@ -25,6 +25,7 @@ struct Heap {
   }
   void join(std::size_t i, std::size_t j) {
     Contact<double> c{};
+    c.normal = Vector3<double>::Zero();
     c.first = static_cast<std::uint32_t>(i);
     c.second = static_cast<std::uint32_t>(j);
     contacts.contacts.push_back(c);
