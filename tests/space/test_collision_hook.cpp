@@ -135,7 +135,7 @@ TEST_CASE("What two that merge lose is right to second order, however far they c
   CAPTURE(fine, half, whole);
   CHECK(half < 0.15);
   CHECK(whole < 0.6);
-  CHECK(half > 4 * fine);  // 16 at order 2
+  CHECK(half > 8 * fine);  // 16 at order 2
   CHECK(half < 64 * fine);
 }
 

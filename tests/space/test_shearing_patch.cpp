@@ -205,13 +205,13 @@ TEST_CASE("A blow across the sheared edge obeys restitution and keeps momentum a
   }
 }
 
-// Epicycles are exact, and the time of a blow is but for h^3: what is left is that the normal is taken on the
-// straight way of the step, which is off by a h^2/8 at most, a about 2 here. So a quarter of the error is
-// left with half the step, at any phase of the blow. Seen to fail: blows that take the spin of the step's
-// start, and let the drift turn by Omega h what they change (half the error with half the step; at 0.05 and a
-// phase of 0.75 those that stick were off by 0.027 in velocity, 0.05 in spin and 0.06 in orientation, now 100
-// times less).
-TEST_CASE("A blow between balls that spin is of second order in the step, for a held one as well") {
+// Epicycles are exact, and the time of a blow is but for h^3: what is left is that the normal of two that
+// move is taken on the straight way of the step, which is off by a h^2/8 at most, a about 2 here. So a
+// quarter of the error is left with half the step, at any phase of the blow, and an eighth off a held one.
+// Seen to fail: blows that take the spin of the step's start, and let the drift turn by Omega h what they
+// change (half the error with half the step; at 0.05 and a phase of 0.75 those that stick were off by 0.027
+// in velocity, 0.05 in spin and 0.06 in orientation, now 100 times less).
+TEST_CASE("A blow between balls that spin is of second order in the step, and of third off a held one") {
   for (const double phase : {0.25, 0.75}) {
     for (const double friction : {0.3, 10.0}) {  // slides, sticks
       for (const bool held : {false, true}) {
@@ -255,7 +255,7 @@ TEST_CASE("A blow between balls that spin is of second order in the step, for a 
             CAPTURE(phase, friction, held, h, k, errors[k], before[k]);
             CHECK(errors[k] < 0.5 * h * h);
             if (h < 0.05) {
-              CHECK_THAT(before[k] / errors[k], WithinAbs(4.0, 0.4));
+              CHECK_THAT(before[k] / errors[k], WithinRel(held ? 8.0 : 4.0, 0.1));
             }
             before[k] = errors[k];
           }

@@ -51,7 +51,7 @@ struct Impact {
   bool rests;                      ///< it stays in contact for the rest of the step
   Scalar settle;  ///< [s] since the start of the step: when the last of its bounces is over, if it rests
   bool decided = false;        ///< by somebody else's outcome
-  Scalar parting = Scalar(0);  ///< [m s^-1] along the normal, of what was decided
+  Scalar parting = Scalar(0);  ///< [m s^-1] along the normal, of what was decided; 0 of what shall merge
 
   ContactKeys keys() const { return {key1, key2}; }
 };

@@ -89,7 +89,7 @@ class ImpactCourses : protected ImpactForecast<S> {
     if (share.first > S(0) && share.second > S(0)) {
       // Moments of inertia over that of the two centres, m_eff d^2.
       const auto momentOf = [&](std::uint32_t i, const ImpactSide<S>& side, const S& shareOfIt) {
-        const S x = side.r / distance;
+        const S x = side.r / at.distance;
         return S(S(scene.bodies.inertiaFactors()[i]) * x * x / shareOfIt);
       };
       const S i1 = momentOf(event.first, one, share.first);

@@ -21,8 +21,12 @@ namespace gravel {
 ///     du = -n.(a_1 - a_0) (t - h/2)/2
 /// and the pair's parting speed (J_n/m* u) du, which is made up when a_1 is known: along the line of centres
 /// of that moment, for angular momentum's sake. What somebody else gave the two counts as a share of u as
-/// well. Blows after which a pair is pressed together, and friction, are left as they are; and so is a pair
-/// that has turned by more than 60 degrees since. In a uniform field a_1 = a_0, and nothing changes.
+/// well. Two that stick to each other until they merge never turn back: they meet at the speed that the mean
+/// of a_0 and of a_1, which is that at the place of the blow, gives by then, so that u lacks
+///     du = -n.(a_1 - a_0) t/2,
+/// and loses all of it. Blows after which a pair is pressed together, and friction, are left as they are; and
+/// so is a pair that has turned by more than 60 degrees since. In a uniform field a_1 = a_0, and nothing
+/// changes.
 template <Real S>
 class LateBlows {
  public:
@@ -50,7 +54,9 @@ class LateBlows {
   S makeUp(B& bodies, const Domain<S>& domain, const S& time, const S& h, ImpulseOf&& impulseOf) {
     S loss(0);
     for (const Blow& blow : blows_) {
-      const S du = (blow.pull - pull(bodies, blow)) * (blow.time - h / S(2)) / S(2);
+      const bool sticks = blow.decided && blow.parting == S(0);
+      const S since = sticks ? blow.time : S(blow.time - h / S(2));
+      const S du = (blow.pull - pull(bodies, blow)) * since / S(2);
       if (du == S(0)) {
         continue;
       }
@@ -71,7 +77,7 @@ class LateBlows {
       S& jn = impulseOf(blow.place).normal;
       const S kept = blow.decided ? S(blow.parting / blow.speed)  // coefficient of restitution
                                   : S(jn / (share.effective * blow.speed) - S(1));
-      const S dv = (S(1) + kept) * du;
+      const S dv = sticks ? S(0) : S((S(1) + kept) * du);
       if (share.first > S(0)) {
         bodies.velocities()[blow.first] -= Vector3<S>((share.first * dv) * n);
       }
@@ -97,7 +103,7 @@ class LateBlows {
     S time;  ///< [s]
     S speed;
     bool decided;  ///< by somebody else, who gave
-    S parting;     ///< [m s^-1] along the normal
+    S parting;     ///< [m s^-1] along the normal, 0 to two that shall merge
   };
 
   template <class B, class Pair>
