@@ -157,6 +157,7 @@ class Space : public Settings<Scalar> {
   /// Steps of single bodies inside those, each with one evaluation of its force, of the methods that give
   /// every body a step of its own; 0 with others.
   std::uint64_t individualSteps() const { return orbits_.individualSteps(); }
+  /// [s] An adaptive one is chosen anew in the first step, and in one before which something was changed.
   Scalar getTimeStep() const { return dt_; }
   /// The next step; where steps adapt, the longest one from now on, so that the next one is not longer.
   void setTimeStep(Scalar dt);
