@@ -65,6 +65,23 @@ TEST_CASE("Kinetic energies of two bodies equal the hand formulas, with their ow
   CHECK(e.potential == 0);
 }
 
+// Seen to fail: m r^2 times the square of the spin, and times the spin (infinite; NaN where it does not
+// turn).
+TEST_CASE("The spin of a giant planet in SI units is in the range of float") {
+  Bodies<float> bodies;
+  Body<float> uranus;
+  uranus.mass = 8.7e25F;
+  uranus.radius = 2.54e7F;
+  bodies.add(uranus);
+  uranus.angularVelocity = {0, 0, 1e-4F};
+  bodies.add(uranus);
+  EnergyLedger<float> ledger;
+  addKineticEnergy(bodies, ledger);
+  CHECK_THAT(ledger.rotational, WithinRel(0.2F * 8.7e25F * 2540.0F * 2540.0F, 1e-6F));
+  CHECK_THAT(conservedQuantities(bodies).angularMomentum[2],
+             WithinRel(0.4F * 8.7e25F * 2540.0F * 2.54e7F, 1e-6F));
+}
+
 TEST_CASE("The field's energy is -m g.x of movable bodies alone") {
   Bodies<double> bodies;
   Body<double> body;

@@ -71,11 +71,19 @@ class BasicBodyProxy {
   Vector3<Scalar> countingSpin() const {
     return isFixed() ? Vector3<Scalar>(Vector3<Scalar>::Zero()) : Vector3<Scalar>(angularVelocity());
   }
+  /// [J], [kg m^2 s^-1] of its spin, as it counts: by the speed of the surface, since m r^2 of a giant planet
+  /// is no float.
+  Scalar rotationalEnergy() const {
+    const Vector3<Scalar> s = Scalar(radius()) * countingSpin();
+    return Scalar(at(fields::InertiaFactor{})) * Scalar(mass()) * s.squaredNorm() / Scalar(2);
+  }
+  Vector3<Scalar> spinMomentum() const {
+    const Scalar r = radius();
+    return (Scalar(at(fields::InertiaFactor{})) * Scalar(mass()) * r) * Vector3<Scalar>(r * countingSpin());
+  }
   /// [J] of its centre and of its spin, as they count.
   Scalar kineticEnergy() const {
-    return (Scalar(mass()) * Scalar(countingVelocity().squaredNorm()) +
-            inertia() * Scalar(countingSpin().squaredNorm())) /
-           Scalar(2);
+    return Scalar(mass()) * Scalar(countingVelocity().squaredNorm()) / Scalar(2) + rotationalEnergy();
   }
 
   void setMaterial(MaterialId material) const requires(!IsConst) {

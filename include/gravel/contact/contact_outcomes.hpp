@@ -110,11 +110,10 @@ ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, con
         if (side.fixed) {
           return;
         }
-        const S moment = S(bodies.inertiaFactors()[i]) * side.mass * side.radius * side.radius;
         outcomes.restitutionLoss -=
             side.mass * Vector3<S>(v - side.velocity).dot(Vector3<S>(v + side.velocity)) / S(2);
-        outcomes.frictionLoss -=
-            moment * Vector3<S>(w - side.angularVelocity).dot(Vector3<S>(w + side.angularVelocity)) / S(2);
+        outcomes.frictionLoss -= detail::gainOfSpin<S>(bodies.inertiaFactors()[i], side.mass, side.radius,
+                                                       side.angularVelocity, w);
         bodies.velocities()[i] = v;
         bodies.angularVelocities()[i] = w;
       };

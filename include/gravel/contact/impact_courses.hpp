@@ -61,10 +61,9 @@ class ImpactCourses : protected ImpactForecast<S> {
     }
     const Vector3<S> nothing = Vector3<S>::Zero();
     const Vector3<S> before = scene.spin(i, t);
-    const S moment = S(scene.bodies.inertiaFactors()[i]) * side.mass * side.r * side.r;
     report.restitutionLoss -=
         side.mass * Vector3<S>(v - side.v).dot(Vector3<S>(Vector3<S>(v + side.v) / S(2) - side.supported));
-    report.frictionLoss -= moment * Vector3<S>(w - before).dot(Vector3<S>(w + before)) / S(2);
+    report.frictionLoss -= gainOfSpin<S>(scene.bodies.inertiaFactors()[i], side.mass, side.r, before, w);
     scene.course.push(scene.bodies, i, S(1), {Vector3<S>(v - side.v), nothing, nothing}, t);
     turn(scene, i, Vector3<S>(scene.course.spinAtStart(w, t)), t);
   }

@@ -16,6 +16,18 @@
 
 namespace gravel {
 
+namespace detail {
+
+/// [J] that a body of inertia k m r^2 gains with another spin, by speeds of its surface: m r^2 of a giant
+/// planet is no float.
+template <Real S>
+S gainOfSpin(const S& k, const S& m, const S& r, const Vector3<S>& before, const Vector3<S>& after) {
+  return k * m * Vector3<S>(r * Vector3<S>(after - before)).dot(Vector3<S>(r * Vector3<S>(after + before))) /
+         S(2);
+}
+
+}  // namespace detail
+
 /// How two bodies share a change of their relative velocity: first + second = 1, by inverse mass. Both 0 if
 /// neither moves. `effective` is m* = 1/(1/m1 + 1/m2).
 template <Real Scalar>

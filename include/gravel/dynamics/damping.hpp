@@ -32,15 +32,15 @@ Scalar damp(Bodies<Scalar, Layout>& bodies, const Scalar& c, const Scalar& c_w, 
         continue;
       }
       const Scalar v_sq = body.velocity().squaredNorm();
-      const Scalar w_sq = body.angularVelocity().squaredNorm();
+      const Scalar turning = body.rotationalEnergy();
       if (!(f == Scalar(1))) {
         const Vector3<Scalar> v = body.velocity();
         const Vector3<Scalar> u = domain.lessFlow(body.position(), v);
         body.velocity() = Vector3<Scalar>(v - u) + f * u;
       }
       body.angularVelocity() *= f_w;
-      lost += half * (Scalar(body.mass()) * (v_sq - Scalar(body.velocity().squaredNorm())) +
-                      body.inertia() * (w_sq - Scalar(body.angularVelocity().squaredNorm())));
+      lost += half * Scalar(body.mass()) * (v_sq - Scalar(body.velocity().squaredNorm())) +
+              (turning - body.rotationalEnergy());
     }
     return lost;
   });

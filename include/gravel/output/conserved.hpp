@@ -27,10 +27,9 @@ ConservedQuantities<Scalar> conservedQuantities(const Bodies<Scalar, Layout>& bo
       const Scalar m = body.mass();
       const Vector3<Scalar> x = body.position();
       const Vector3<Scalar> p = body.countingVelocity() * m;
-      const Vector3<Scalar> spin = body.countingSpin() * body.inertia();
       part[0] += m;
       part.template segment<3>(1) += p.array();
-      part.template segment<3>(4) += Vector3<Scalar>(x.cross(p) + spin).array();
+      part.template segment<3>(4) += Vector3<Scalar>(x.cross(p) + body.spinMomentum()).array();
       part.template segment<3>(7) += (x * m).array();
     }
     return part;

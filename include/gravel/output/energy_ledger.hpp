@@ -42,7 +42,7 @@ void addKineticEnergy(const Bodies<Scalar, Layout>& bodies, EnergyLedger<Scalar>
     for (std::size_t i = begin; i < end; ++i) {
       const auto body = bodies[i];
       part[0] += half * Scalar(body.mass()) * Scalar(body.countingVelocity().squaredNorm());
-      part[1] += half * body.inertia() * Scalar(body.countingSpin().squaredNorm());
+      part[1] += body.rotationalEnergy();
     }
     return part;
   });
