@@ -46,6 +46,8 @@ void MaterialReader::readMaterial(TableReader& reader) {
     reader.missing("\"name\", by which bodies and planes ask for it");
   } else if (isText && std::find(names_.begin(), names_.end(), name) != names_.end()) {
     reader.fault("name", "\"" + name + "\"", "a name that no other material has");
+  } else if (isText && name.empty()) {
+    reader.fault("name", "\"\"", "a text that is not empty");
   } else if (isText) {
     names_.push_back(name);
     ids_.push_back(add(material));
@@ -61,7 +63,9 @@ void MaterialReader::readPair(TableReader& reader) {
   const bool found = reader.texts("materials", names) && find(reader, "materials", names[0], ids[0]) &&
                      find(reader, "materials", names[1], ids[1]);
   Material<double> both = mix(valueOf(ids[0]), valueOf(ids[1]));
-  readCoefficients(reader, both);
+  if (!readCoefficients(reader, both)) {
+    reader.missing("coefficients; without them two materials mix");
+  }
   if (!found) {
     return;
   }

@@ -88,12 +88,16 @@ std::string misfitOfMaterials(const Space<double>& start, const Space<double>& s
   for (const Plane<double>& plane : start.planes()) {
     used.insert(plane.material);
   }
+  const auto number = [](MaterialId id) { return std::to_string(static_cast<std::uint32_t>(id)); };
+  for (const MaterialId a : used) {
+    if (!(start.material(a) == saved.material(a))) {
+      return "its material " + number(a) + " is not the scene's";
+    }
+  }
   for (const MaterialId a : used) {
     for (const MaterialId b : used) {
       if (!(start.pairMaterial(a, b) == saved.pairMaterial(a, b))) {
-        return "materials " + std::to_string(static_cast<std::uint32_t>(a)) + " and " +
-               std::to_string(static_cast<std::uint32_t>(b)) +
-               " are to each other what they are not in the scene";
+        return "its pair of materials " + number(a) + " and " + number(b) + " is not the scene's";
       }
     }
   }

@@ -122,7 +122,7 @@ refuses 2 "or material of its plane 0 is not the scene's" other_surface --restar
 refuses 2 "inertia, .* of its body 0 is not the scene's" other_inertia --restart "$folder/resting.gravel"
 go pair pair_half --duration 0.5 || exit 1
 go pair pair_whole --restart "$folder/pair_half.gravel" || exit 1
-refuses 2 "materials 1 and 2 are to each other" other_pair --restart "$folder/pair_half.gravel"
+refuses 2 "its pair of materials 1 and 2 is not the scene" other_pair --restart "$folder/pair_half.gravel"
 refuses 2 "is the state at time 2; allowed: one before the end, 2" grains --restart "$folder/whole.gravel"
 refuses 1 "grains.toml" grains --restart "$folder/grains.toml"
 refuses 1 "cannot save to .*: it is a folder" grains --save "$folder/whole"

@@ -139,6 +139,26 @@ TEST_CASE("What two that merge lose is right to second order, however far they c
   CHECK(half < 64 * fine);
 }
 
+// Seen to fail: two that merge take no notice of each other after the first blow, and fly through each other
+// when the floor strikes one (4.4 of their 9.3 joules).
+TEST_CASE("Two that merge stick to each other when something else strikes one of them in the same step") {
+  for (int k = 0; k < 40; ++k) {
+    SimulationConfig<double> config = plain(0.05);
+    config.G = 1.0;
+    config.coeffRestitution = 0.9;
+    Space<double> space(config);
+    space.addPlane({0, 0, 1}, 0);
+    const double later = 0.025 * k / 40;
+    space.addBody(ball({0, 0, 0.101 + later}, {0, 0, -1}, 0.1, 0.5));
+    space.addBody(ball({0.02, 0, 0.302 + later}, {0, 0, -6}, 0.1, 0.5));
+    space.setCollisionHook(mergeAll);
+    const double start = space.energyLedger().total();
+    advance(space, 2);
+    CHECK(space.n() == 1);
+    CHECK_THAT(space.energyLedger().total(), WithinAbs(start, 0.15));
+  }
+}
+
 TEST_CASE("Three in a row that meet in one step become one") {
   Space<double> space(bouncy(0.1));
   space.addBody(ball({-1.05, 0, 0}, {3, 0, 0}, 0.5, 1.0));
@@ -203,6 +223,30 @@ TEST_CASE("The elastic law, given by a hook, bounces under gravity as the materi
     }
     CHECK((spaces[0].body(0).position() - spaces[1].body(0).position()).norm() < 1e-10);
     CHECK((spaces[0].body(0).velocity() - spaces[1].body(0).velocity()).norm() < 1e-10);
+  }
+}
+
+// Two grains that meet at a millimetre a second, beside a mass that pulls them. Seen to fail: what their
+// approach lacks made up for in proportion to the speed that they are given (2.099 and 34 m/s at a hundredth
+// of a second).
+TEST_CASE("Velocities of the user's own are what the bodies leave with, however slowly they met") {
+  for (const double speed : {1.0, 10.0}) {
+    for (const double h : {1e-2, 1e-3}) {
+      SimulationConfig<double> config = plain(h);
+      config.G = 1.0;
+      Space<double> space(config);
+      space.addBody(ball({-1e-6, 0, 0}, {5e-4, 0, 0}, 1e-6, 1e-12));
+      space.addBody(ball({1e-6 + 9e-6, 0, 0}, {-5e-4, 0, 0}, 1e-6, 1e-12));
+      Body<double> mass = ball({0, 0.4, 0}, {0, 0, 0}, 0.01, 1.0);
+      mass.fixed = true;
+      space.addBody(mass);
+      space.setCollisionHook([speed](const Hit&) {
+        return Outcome::velocities({-speed, 0, 0}, {0, 0, 0}, {speed, 0, 0}, {0, 0, 0});
+      });
+      advance(space, static_cast<std::size_t>(std::lround(0.01 / h)));
+      const double parting = space.body(1).velocity()[0] - space.body(0).velocity()[0];
+      CHECK_THAT(parting, WithinRel(2 * speed, 1e-4));
+    }
   }
 }
 

@@ -75,7 +75,9 @@ class ImpactCourses : protected ImpactForecast<S> {
   }
 
   /// What two that shall merge have until then, as one rigid body with their momentum and angular momentum.
-  /// (In flight through each other they would pull each other at any strength.) About what cannot move: rest.
+  /// What pulls them together they have besides as speed of parting, so that they end the step no nearer to
+  /// each other than they met. (In flight through each other they would pull each other at any strength.)
+  /// About what cannot move: rest.
   template <class Scene>
   static CollisionOutcome<S> asOne(const Scene& scene, const ImpactEvent<S>& event,
                                    const ImpactMeeting<S>& at, const Vector3<S>& v_rel) {
@@ -86,17 +88,18 @@ class ImpactCourses : protected ImpactForecast<S> {
     to.angularVelocity2 = scene.spin(event.second, event.t);
     Vector3<S> dv = -v_rel;
     if (share.first > S(0) && share.second > S(0)) {
-      // Moments of inertia over that of the two centres, m_eff d^2.
-      const auto momentOf = [&](std::uint32_t i, const ImpactSide<S>& side, const S& shareOfIt) {
+      // Moments of inertia over M d^2, with the mass M of both.
+      const auto momentOf = [&](std::uint32_t i, const ImpactSide<S>& side, const S& shareOfMass) {
         const S x = side.r / at.distance;
-        return S(S(scene.bodies.inertiaFactors()[i]) * x * x / shareOfIt);
+        return S(S(scene.bodies.inertiaFactors()[i]) * x * x * shareOfMass);
       };
-      const S i1 = momentOf(event.first, one, share.first);
-      const S i2 = momentOf(event.second, two, share.second);
+      const S i1 = momentOf(event.first, one, share.second);
+      const S i2 = momentOf(event.second, two, share.first);
+      const S both = i1 + i2;
+      const S orbit = share.first * share.second;
       const Vector3<S> spins = i1 * to.angularVelocity1 + i2 * to.angularVelocity2;
       const Vector3<S> about = spins.dot(n) * n;
-      const Vector3<S> across = (spins - about + n.cross(v_rel) / distance) / (i1 + i2 + S(1));
-      const S both = i1 + i2;
+      const Vector3<S> across = (spins - about + orbit * n.cross(v_rel) / distance) / (both + orbit);
       to.angularVelocity1 = both > S(0) ? Vector3<S>(across + about / both) : across;
       to.angularVelocity2 = to.angularVelocity1;
       dv += across.cross(n) * distance;

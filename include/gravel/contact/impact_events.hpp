@@ -205,14 +205,19 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     const S& t = event.t;
     const Impact<S> impact{event.first, event.second, event.key1, event.key2, t, speed,
                            n,           distance,     {},         false,      t, true};
-    CollisionOutcome<S> outcome = decide(impact, material, one.v, two.v, v_rel);
+    // Two that stick, of which something else has struck one, stick again.
+    const bool stick = Base::isToMerge(event.first, event.key2);
+    CollisionOutcome<S> outcome =
+        stick ? CollisionOutcome<S>::merge() : decide(impact, material, one.v, two.v, v_rel);
     if (outcome.kind == CollisionKind::Bounce) {
       return false;
     }
     impacts_.push_back(impact);
     const bool merges = outcome.kind == CollisionKind::Merge;
     if (merges) {
-      merges_.emplace_back(event.key1, event.key2);
+      if (!stick) {
+        merges_.emplace_back(event.key1, event.key2);
+      }
       outcome = Base::asOne(scene, event, at, v_rel);
     }
     // Two that part may be driven together again in this step. Those that do not would meet for ever: they

@@ -81,10 +81,14 @@ class ImpactPast {
     return known == Listed::Yes;
   }
 
-  /// Whether somebody else has decided about the pair in this step, and not that they part.
-  bool isDecided(std::uint32_t first, std::uint64_t key2) const {
+  /// Whether somebody else has given the pair velocities in this step, with which they do not part.
+  bool isDecided(std::uint32_t first, std::uint64_t key2) const { return isDecided(first, key2, true); }
+  /// Whether somebody else lets the two merge.
+  bool isToMerge(std::uint32_t first, std::uint64_t key2) const { return isDecided(first, key2, false); }
+
+  bool isDecided(std::uint32_t first, std::uint64_t key2, bool rests) const {
     for (std::uint32_t k = histories_.of(first).rests; k != none; k = earlier_[k]) {
-      if (impacts_[k].decided && impacts_[k].key2 == key2) {
+      if (impacts_[k].decided && impacts_[k].rests == rests && impacts_[k].key2 == key2) {
         return true;
       }
     }

@@ -7,6 +7,7 @@
 #include <gravel/contact/impact.hpp>
 #include <gravel/spatial/domain.hpp>
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -21,8 +22,9 @@ namespace gravel {
 ///     du = -n.(a_1 - a_0) (t - h/2)/2
 /// and the pair's parting speed (J_n/m* u) du, which is made up when a_1 is known: along the line of centres
 /// of that moment, for angular momentum's sake. What somebody else gave the two counts as a share of u as
-/// well. Two that stick to each other until they merge never turn back: they meet at the speed that the mean
-/// of a_0 and of a_1, which is that at the place of the blow, gives by then, so that u lacks
+/// well, up to all of it: more is none of u. Two that stick to each other until they merge never turn back:
+/// they meet at the speed that the mean of a_0 and of a_1, which is that at the place of the blow, gives by
+/// then, so that u lacks
 ///     du = -n.(a_1 - a_0) t/2,
 /// and loses all of it. Blows after which a pair is pressed together, and friction, are left as they are; and
 /// so is a pair that has turned by more than 60 degrees since. In a uniform field a_1 = a_0, and nothing
@@ -75,8 +77,8 @@ class LateBlows {
         continue;
       }
       S& jn = impulseOf(blow.place).normal;
-      const S kept = blow.decided ? S(blow.parting / blow.speed)  // coefficient of restitution
-                                  : S(jn / (share.effective * blow.speed) - S(1));
+      const S parting = blow.decided ? blow.parting : S(jn / share.effective - blow.speed);
+      const S kept = std::min<S>(parting / blow.speed, S(1));
       const S dv = sticks ? S(0) : S((S(1) + kept) * du);
       if (share.first > S(0)) {
         bodies.velocities()[blow.first] -= Vector3<S>((share.first * dv) * n);
@@ -87,7 +89,7 @@ class LateBlows {
       if (!blow.decided) {
         jn += share.effective * dv;
       }
-      loss += share.effective * (S(1) - kept * kept) * blow.speed * du;
+      loss += share.effective * (blow.speed - kept * parting) * du;
     }
     blows_.clear();
     return loss;
