@@ -96,18 +96,8 @@ MaterialId MaterialReader::surfaceOf(TableReader& reader) {
 }
 
 Material<double> MaterialReader::valueOf(MaterialId id) const {
-  if (id != defaultMaterial) {
-    return scene_.materials[static_cast<std::size_t>(id) - 1];
-  }
-  const SimulationConfig<double>& config = scene_.config;
-  return {.restitution = config.coeffRestitution,
-          .staticFriction = std::max(config.coeffStaticFriction, config.coeffFriction),
-          .kineticFriction = config.coeffFriction,
-          .tangentialRestitution = config.tangentialRestitution,
-          .restitutionExponent = config.restitutionExponent,
-          .restitutionSpeed = config.restitutionSpeed,
-          .rollingFriction = config.rollingFriction,
-          .spinningFriction = config.spinningFriction};
+  return id == defaultMaterial ? MaterialTable<double>().get(id, scene_.config)
+                               : scene_.materials[static_cast<std::size_t>(id) - 1];
 }
 
 MaterialId MaterialReader::add(const Material<double>& material) {

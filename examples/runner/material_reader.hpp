@@ -26,9 +26,9 @@ class MaterialReader {
   MaterialId surfaceOf(TableReader& reader);
 
  private:
-  Material<double> valueOf(MaterialId id) const;
+  Material<double> valueOf(MaterialId id) const;  ///< alone
   MaterialId add(const Material<double>& material);
-  /// The material of a name that stands at `node`, or a fault.
+  /// The material of a name that stands under `key`, or a fault.
   bool find(TableReader& reader, const char* key, const std::string& name, MaterialId& found) const;
 
   Scene& scene_;
