@@ -254,6 +254,31 @@ TEST_CASE("Bodies that merge in a part of a step are one in the next part") {
   }
 }
 
+// Forces are held from part to part, and found anew where bodies merge. Seen to fail: those that were held
+// until then are not made up for (1e-4 to 5e-4).
+TEST_CASE("A merger in a part of a step leaves the angular momentum of what orbits elsewhere as it is") {
+  for (const std::size_t parts : {2U, 5U}) {
+    int merged = 0;
+    for (int k = 0; k < 20; ++k) {
+      SimulationConfig<double> config = inParts(0.1, parts);
+      config.G = 1.0;
+      Space<double> space(config);
+      space.addBody(ball({-1, 0, 0}, {0, -0.4, 0.1}, 0.1, 1.0));
+      space.addBody(ball({1, 0, 0}, {0, 0.4, -0.1}, 0.1, 1.0));
+      // Too light to matter; they meet at all times of the second step.
+      space.addBody(ball({0, 50, 0}, {0, 0, 0}, 0.1, 1e-14));
+      space.addBody(ball({0.2 + 0.1 * (1 + k / 20.0), 50, 0}, {-1, 0, 0}, 0.1, 1e-14));
+      space.setCollisionHook([](const Collision<double>&) { return CollisionOutcome<double>::merge(); });
+      const Vector3<double> before = space.conserved().angularMomentum;
+      advance(space, 2);
+      merged += space.n() == 3 ? 1 : 0;
+      advance(space, 20);
+      CHECK((space.conserved().angularMomentum - before).norm() < 1e-11);
+    }
+    CHECK(merged >= 18);  // at its very ends it may be the step before or after
+  }
+}
+
 TEST_CASE("A shearing patch in parts: order two under its own gravity") {
   const auto run = [](double dt, std::size_t parts) {
     SimulationConfig<double> config = inParts(dt, parts);

@@ -261,7 +261,7 @@ class Space : public Settings<Scalar> {
   std::size_t moveFewPoints(const Scalar& h, const Scalar* until, Profiler::Step& timing);
   bool hasSeveralDrifts() const;
   std::size_t chooseParts(const Scalar& h);
-  void advance(const Scalar& h, std::size_t part, std::size_t parts);
+  void advance(const Scalar& h, std::size_t part, std::size_t parts, Scalar& found);
   void prepare();
   void wakeTheChanged();
   void fallAsleep();

@@ -92,8 +92,9 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration, const Sc
     if (areFewPoints()) {
       more = moveFewPoints(h, until, timing);
     } else {
+      Scalar found(0);
       for (std::size_t part = 0; part < parts_; ++part) {
-        advance(h, part, parts_);
+        advance(h, part, parts_, found);
       }
     }
     left_.restitution += contact_.report().restitutionLoss;

@@ -12,7 +12,9 @@
 /// carries its weight in every part, so that nothing falls between two evaluations nor is thrown up by a kick
 /// of the whole step's gravity, as it would be if forces came as impulses at the ends alone (r-RESPA:
 /// Tuckerman, Berne & Martyna 1992, J. Chem. Phys. 97, 1990); without contacts both are the same map. A blow
-/// meets a_0, off by h da/dt, as in a step of one part, until a_1 is known (LateBlows): order 2. In a
+/// meets a_0, off by h da/dt, as in a step of one part, until a_1 is known (LateBlows): order 2. Where bodies
+/// merge after a part, forces are found there, twice: before, to make up for the held ones as at the end, or
+/// what pulls each other would lose angular momentum; and after, to be held from then on. In a
 /// shear-periodic domain the drift is no straight line: there a held force and one that kicks at the ends
 /// differ by O(h^3) a step, so that with n > 1 order 2 is kept, but reversible the map is only up to that.
 ///
@@ -104,8 +106,9 @@ std::size_t Space<Scalar, Layout>::chooseParts(const Scalar& h) {
 }
 
 /// One part of a step of length h.
+/// \param found  [s] since the start of the step, when forces were last found; set where they are anew
 template <Real Scalar, class Layout>
-void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size_t parts) {
+void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size_t parts, Scalar& found) {
   forcesValid_ = false;  // if a hook throws
   force_.contactKicks.clear();
   const bool last = part + 1 == parts;
@@ -119,10 +122,9 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
   const Scalar start = share(part);
   const Scalar end = last ? h : share(part + 1);
   contact_dt_ = parts == 1 ? h : Scalar(h / Scalar(static_cast<double>(parts)));
-  const bool apart = hasSeveralDrifts() && parts > 1;  // each part is a step with its own forces
-  const bool held = !last && !apart;                   // forces go on as they are
-  // [s] for which the last kick makes up
-  const Scalar late = apart ? Scalar(0) : Scalar(Scalar(h - contact_dt_) / Scalar(2));
+  const bool apart = hasSeveralDrifts() && parts > 1;           // each part is a step with its own forces
+  const bool held = !last && !apart;                            // forces go on as they are
+  const Scalar span = apart ? contact_dt_ : Scalar(h - found);  // [s] from the last forces to those to come
   const HillFrame<Scalar> frame(contact_.domain);
   // Without mutual gravity runs are not long orbits, and nothing is carried; nor along an epicycle.
   const bool carry = this->config_.compensatedSummation && !(getG() == Scalar(0)) && !frame.turns() &&
@@ -132,24 +134,29 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
   const auto kick = [&](const Scalar& time) {
     detail::kickAndDrift(bodies_, time, Scalar(0), torques, lost);
   };
-  const auto forces = [&](const Scalar& passed, std::span<const Vector> kicks = {}) {
-    if (held) {
-      return;
-    }
+  // Where velocities are half of `lag` behind but for the kicks of `late` that held forces gave [s], for
+  // which the new ones make up.
+  const auto find = [&](const Scalar& passed, const Scalar& lag, const Scalar& late,
+                        std::span<const Vector> kicks) {
     if (late > Scalar(0)) {
-      kick(Scalar(-late));  // back to the velocity of the step's middle, as one part has it here
+      kick(Scalar(-late));  // back to the velocity of the middle, as one part has it here
     }
     // Stages of several drifts stand at no moment of their own. What is no row of kicks and drifts brings
     // velocities to the moment of the forces, or says what they lack, and kicks spins alone.
     Behind<Scalar> behind{.kicks = kicks};
     if (!hasSeveralDrifts() || apart) {
-      behind.spins = (apart ? contact_dt_ : h) / Scalar(2);
+      behind.spins = lag / Scalar(2);
       behind.velocities = orbits_.moves(this->config_.integrator) ? Scalar(0) : behind.spins;
     }
     force_.evaluate(bodies_, getG(), this->config_.softening, contact_.domain,
                     Scalar(time_ + (start + passed)), profiler_, behind);
     if (late > Scalar(0)) {
       kick(late);
+    }
+  };
+  const auto forces = [&](const Scalar& passed, std::span<const Vector> kicks = {}) {
+    if (!held) {
+      find(passed, span, Scalar(Scalar(span - contact_dt_) / Scalar(2)), kicks);
     }
   };
   const bool works = static_cast<bool>(force_.hook);
@@ -171,7 +178,7 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
   const bool quiet = hasSeveralDrifts() && !apart;
   const Departure departure{this,
                             start,
-                            apart ? Scalar(0) : start,
+                            apart ? Scalar(0) : Scalar(start - found),
                             contact_dt_,
                             {halves(2 * part + 1), halves(2)},
                             !quiet && (alone == nullptr || !contacts().empty())};
@@ -204,12 +211,17 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
   rememberPlaces();
   left_.correction += contact_.separationWork(force_, bodies_, Scalar(contact_dt_ / Scalar(2)));
   if (!held) {
-    contact_.makeUpBlows(bodies_, Scalar(time_ + end), apart ? contact_dt_ : h);
+    contact_.makeUpBlows(bodies_, Scalar(time_ + end), span);
   }
   const std::vector<std::pair<BodyId, BodyId>> merges = decideCollisions(Scalar(time_ + end));
+  const bool anew = !last && !merges.empty();  // forces are found once more
+  if (anew && held) {
+    const Scalar passed = end - found;
+    find(contact_dt_, passed, Scalar(passed / Scalar(2)), {});
+    contact_.makeUpBlows(bodies_, Scalar(time_ + end), passed);
+  }
   contact_.drivePlanes(halves(2 * part + 2));
   resolveCollisions();
-  const bool anew = !last && !merges.empty();  // forces are found once more
   bendWay();
   if (works && (!held || anew)) {
     left_.work -= force_.hookWork.end(bodies_, force_.hookForces());
@@ -221,6 +233,7 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
     contact_.endMerged(bodies_, merges);
     force_.evaluate(bodies_, getG(), this->config_.softening, contact_.domain, Scalar(time_ + end),
                     profiler_);
+    found = end;
     if (works) {
       force_.hookWork.begin(bodies_, force_.hookForces(), driftsFreely);
     }
