@@ -2,6 +2,7 @@
 
 #include "builtin_scene.hpp"
 #include "diagnostics.hpp"
+#include "drive.hpp"
 #include "picture.hpp"
 #include "progress.hpp"
 #include "restart.hpp"
@@ -19,6 +20,7 @@
 #include <filesystem>
 #include <iostream>
 #include <new>
+#include <string_view>
 #include <system_error>
 
 #ifdef _OPENMP
@@ -76,6 +78,11 @@ Space<double> makeSpace(const Scene& scene) {
   for (const SceneBody& entry : scene.bodies) {
     space.addBody(entry.body);
   }
+  if (scene.meeting == Meeting::Merge) {
+    space.setCollisionHook([](const Collision<double>&) { return CollisionOutcome<double>::merge(); });
+  } else if (scene.meeting == Meeting::MergeBelowEscape) {
+    space.setCollisionHook(mergeBelowEscapeSpeed(scene.config.G, scene.escapeFactor));
+  }
   space.check();
   return space;
 }
@@ -94,7 +101,7 @@ Space<double> firstSpace(const Scene& scene, const Options& options) {
     }
   }();
   if (!options.restart.empty()) {
-    takeUp(space, scene.duration, options.restart);
+    takeUp(space, scene, options.restart);
   }
   return space;
 }
@@ -224,12 +231,12 @@ class Schedule {
   double duration_, interval_;
 };
 
-/// Makes one step, or what is left of one until `end`, so that each can be looked at. Which one an adaptive
+/// Makes one step, or what is left of one until the end, so that each can be looked at. Which one an adaptive
 /// run begins with, the space finds when it makes it: until then it says the longest that is allowed. That is
 /// kept within the run for this one step; all later ones may be as long as the scene says, in a run that goes
 /// on from here, too.
-void stepTowards(Space<double>& space, double end) {
-  const double rest = end - space.time();
+void stepTowards(Space<double>& space, const Scene& scene) {
+  const double rest = scene.duration - space.time();
   const bool isChosenLater =
       space.steps() == 0 && space.config().adaptiveTimeStep && space.config().minTimeStep < rest;
   const double longest = space.config().timeStep;
@@ -238,10 +245,12 @@ void stepTowards(Space<double>& space, double end) {
     space.setTimeStep(rest);
   }
   // A millionth of a step that would be left is rounding in the sum of steps.
-  if (isChosenLater || rest > space.getTimeStep() * (1.0 + 1e-6)) {
+  const bool isWhole = isChosenLater || rest > space.getTimeStep() * (1.0 + 1e-6);
+  drive(space, scene, isWhole ? space.getTimeStep() : rest);
+  if (isWhole) {
     space.computeDynamics(space.steps());
   } else {
-    space.advanceTo(end);
+    space.advanceTo(scene.duration);
   }
   if (isLimited) {
     space.setTimeStep(longest);
@@ -305,7 +314,7 @@ int run(const Options& options) {
   Schedule frames(scene.output.frames, scene.duration);
   Schedule rows(std::max<std::size_t>(scene.output.rows, 2), scene.duration);
   Schedule marks(scene.picture.trails ? 2000 : 0, scene.duration);
-  Trails trails(scene.picture.trails ? space.n() : 0);
+  Trails trails;
   Progress progress(scene.units, scene.duration, options.quiet, space);
   space.setLog([](const char* line) { std::fprintf(stderr, "%s\n", line); });
 
@@ -318,8 +327,8 @@ int run(const Options& options) {
       series->write(vtkPoints(space.bodies()), space.time());
     }
     if (marks.isDue(space.time())) {
-      for (std::size_t i = 0; i < trails.size(); ++i) {
-        addToTrail(trails[i], space.body(i).position(), space.domain());
+      for (const auto body : space.bodies()) {
+        addToTrail(trails[toInteger(body.id())], body.position(), space.domain());
       }
     }
     progress.show(space, diagnostics.history().drift());
@@ -329,7 +338,7 @@ int run(const Options& options) {
   observe(false);
   bool isStop = false;
   while (space.time() < scene.duration && !isStop) {
-    stepTowards(space, scene.duration);
+    stepTowards(space, scene);
     diagnostics.count(space);
     isStop = stopRequested != 0 && space.time() < scene.duration;
     observe(isStop);
@@ -440,7 +449,8 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "%s\n", error.what());
     return 2;
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "gravel-run: %s\n", error.what());
+    const std::string_view words = error.what(), name = "gravel: ";  // which the library's own begin with
+    std::fprintf(stderr, "gravel-run: %s\n", error.what() + (words.starts_with(name) ? name.size() : 0));
     return 1;
   }
 }

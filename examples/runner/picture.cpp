@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <new>
 
 #if defined(__GNUC__)
@@ -33,10 +34,10 @@ double quantile(std::vector<double> values, double share) {
 /// Where the body is, and its path where there are trails.
 std::vector<Vector3<double>> placesOf(std::size_t i, const Space<double>& space, const Trails& trails) {
   std::vector<Vector3<double>> places{space.body(i).position()};
-  for (std::size_t k = 0; i < trails.size() && k < trails[i].size(); ++k) {
-    if (trails[i][k].allFinite()) {
-      places.push_back(trails[i][k]);
-    }
+  const auto found = trails.find(toInteger(space.body(i).id()));
+  if (found != trails.end()) {
+    std::copy_if(found->second.begin(), found->second.end(), std::back_inserter(places),
+                 [](const Vector3<double>& place) { return place.allFinite(); });
   }
   return places;
 }
@@ -118,6 +119,10 @@ bool writePicture(const std::filesystem::path& path, const Scene& scene, const S
                               static_cast<float>(shade / warmth));
     }
     picture.spheres.push_back(sphere);
+    const auto trail = trails.find(id);
+    if (trail != trails.end()) {
+      picture.trails.push_back({trail->second, sphere.colour});
+    }
     top = std::max(top, picture.view.up.dot(sphere.centre) + sphere.radius);
   }
   for (std::size_t i = 0; i < scene.planes.size(); ++i) {
@@ -125,9 +130,6 @@ bool writePicture(const std::filesystem::path& path, const Scene& scene, const S
       const Plane<double>& now = space.planes()[i];  // where it has travelled to
       picture.planes.push_back({now.normal, now.offset, *scene.planes[i].colour, top});
     }
-  }
-  for (std::size_t i = 0; i < trails.size() && i < picture.spheres.size(); ++i) {
-    picture.trails.push_back({trails[i], picture.spheres[i].colour});
   }
 
   const std::vector<std::uint8_t> pixels = render(picture);

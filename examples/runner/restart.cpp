@@ -34,15 +34,36 @@ bool areAlike(const Space<double>& a, const Space<double>& b, std::size_t i) {
 }
 
 /// The same surfaces that move alike. The offset counts where nothing moves the plane along its normal: one
-/// that travels is elsewhere by now.
+/// that travels is elsewhere by now; and one that shakes has another velocity in each step.
 bool areAlike(const Space<double>& a, const Plane<double>& ofA, const Space<double>& b,
-              const Plane<double>& ofB) {
-  const bool travels = ofA.normal.dot(ofA.velocity) != 0.0;
-  return ofA.normal == ofB.normal && ofA.velocity == ofB.velocity && (travels || ofA.offset == ofB.offset) &&
-         ofA.material == ofB.material && a.material(ofA.material) == b.material(ofB.material);
+              const Plane<double>& ofB, bool shakes) {
+  const bool travels = shakes || ofA.normal.dot(ofA.velocity) != 0.0;
+  return ofA.normal == ofB.normal && (shakes || ofA.velocity == ofB.velocity) &&
+         (travels || ofA.offset == ofB.offset) && ofA.material == ofB.material &&
+         a.material(ofA.material) == b.material(ofB.material);
 }
 
-std::string misfitOfBodies(const Space<double>& start, const Space<double>& saved) {
+/// Where bodies merge those that are left are some of the scene's, and have the mass of all.
+std::string misfitOfMerged(const Space<double>& start, const Space<double>& saved) {
+  std::set<std::uint64_t> ids;
+  for (const auto body : start.bodies()) {
+    ids.insert(toInteger(body.id()));
+  }
+  for (const auto body : saved.bodies()) {
+    if (ids.count(toInteger(body.id())) == 0) {
+      return "it has a body " + std::to_string(toInteger(body.id())) + ", the scene none";
+    }
+  }
+  const double mass = saved.conserved().mass, whole = start.conserved().mass;
+  return std::abs(mass - whole) > 1e-9 * whole
+             ? "its mass is " + detail::formatReal(mass) + ", the scene's " + detail::formatReal(whole)
+             : std::string();
+}
+
+std::string misfitOfBodies(const Scene& scene, const Space<double>& start, const Space<double>& saved) {
+  if (scene.meeting != Meeting::Bounce) {
+    return misfitOfMerged(start, saved);
+  }
   if (saved.n() != start.n()) {
     return "it has " + counted(saved.n(), "body", "bodies") + ", the scene " + std::to_string(start.n());
   }
@@ -55,7 +76,7 @@ std::string misfitOfBodies(const Space<double>& start, const Space<double>& save
   return {};
 }
 
-std::string misfitOfSettings(const Space<double>& start, const Space<double>& saved) {
+std::string misfitOfSettings(const Scene&, const Space<double>& start, const Space<double>& saved) {
   const auto asked = settingsOf(start.config());
   const auto found = settingsOf(saved.config());
   for (std::size_t k = 0; k < asked.size(); ++k) {
@@ -66,13 +87,14 @@ std::string misfitOfSettings(const Space<double>& start, const Space<double>& sa
   return {};
 }
 
-std::string misfitOfSurroundings(const Space<double>& start, const Space<double>& saved) {
-  if (!(saved.domain() == start.domain()) || saved.uniformField() != start.uniformField() ||
+std::string misfitOfSurroundings(const Scene& scene, const Space<double>& start, const Space<double>& saved) {
+  const bool turns = scene.fieldTurn != Vector3<double>::Zero();
+  if (!(saved.domain() == start.domain()) || (!turns && saved.uniformField() != start.uniformField()) ||
       saved.planes().size() != start.planes().size()) {
     return "its domain, field or planes are not the scene's";
   }
   for (std::size_t k = 0; k < start.planes().size(); ++k) {
-    if (!areAlike(start, start.planes()[k], saved, saved.planes()[k])) {
+    if (!areAlike(start, start.planes()[k], saved, saved.planes()[k], scene.planes[k].shakes())) {
       return "normal, place, velocity or material of its plane " + std::to_string(k) + " is not the scene's";
     }
   }
@@ -80,7 +102,7 @@ std::string misfitOfSurroundings(const Space<double>& start, const Space<double>
 }
 
 /// Bodies and planes are alike by now, so that their materials have the same numbers.
-std::string misfitOfMaterials(const Space<double>& start, const Space<double>& saved) {
+std::string misfitOfMaterials(const Scene&, const Space<double>& start, const Space<double>& saved) {
   std::set<MaterialId> used;
   for (std::size_t i = 0; i < start.n(); ++i) {
     used.insert(start.body(i).material());
@@ -105,9 +127,9 @@ std::string misfitOfMaterials(const Space<double>& start, const Space<double>& s
 }
 
 /// What of a saved state does not belong to the scene that starts as `start`; empty if all does.
-std::string misfit(const Space<double>& start, const Space<double>& saved) {
+std::string misfit(const Scene& scene, const Space<double>& start, const Space<double>& saved) {
   for (const auto look : {misfitOfBodies, misfitOfSettings, misfitOfSurroundings, misfitOfMaterials}) {
-    const std::string found = look(start, saved);
+    const std::string found = look(scene, start, saved);
     if (!found.empty()) {
       return found;
     }
@@ -117,16 +139,16 @@ std::string misfit(const Space<double>& start, const Space<double>& saved) {
 
 }  // namespace
 
-void takeUp(Space<double>& space, double duration, const std::string& file) {
+void takeUp(Space<double>& space, const Scene& scene, const std::string& file) {
   const Space<double> start = space;
   space.restore(file);
-  const std::string other = misfit(start, space);
+  const std::string other = misfit(scene, start, space);
   if (!other.empty()) {
     throw SceneError(file + ": is the state of another scene: " + other);
   }
-  if (!(space.time() < duration)) {
+  if (!(space.time() < scene.duration)) {
     throw SceneError(file + ": is the state at time " + detail::formatReal(space.time()) +
-                     "; allowed: one before the end, " + detail::formatReal(duration));
+                     "; allowed: one before the end, " + detail::formatReal(scene.duration));
   }
 }
 

@@ -20,13 +20,21 @@ struct SceneBody {
   Surface surface = Surface::Rock;
 };
 
+/// It goes the way velocity t + shake sin(2 pi t/shakePeriod).
 struct ScenePlane {
   Vector3<double> normal = Vector3<double>::UnitZ();
   double offset = 0.0;
   Vector3<double> velocity = Vector3<double>::Zero();
+  Vector3<double> shake = Vector3<double>::Zero();
+  double shakePeriod = 0.0;
   MaterialId material = defaultMaterial;
   std::optional<Colour> colour;  ///< not drawn without one
+
+  bool shakes() const { return shake != Vector3<double>::Zero(); }
 };
+
+/// What comes of two bodies that meet.
+enum class Meeting { Bounce, Merge, MergeBelowEscape };
 
 /// What units the scene's numbers have: names for the output only, nothing is converted.
 struct Units {
@@ -64,7 +72,10 @@ struct Scene {
   Units units;
   SimulationConfig<double> config;
   Domain<double> domain = Domain<double>::open();
-  Vector3<double> field = Vector3<double>::Zero();
+  Vector3<double> field = Vector3<double>::Zero();      ///< at the start
+  Vector3<double> fieldTurn = Vector3<double>::Zero();  ///< its angular velocity
+  Meeting meeting = Meeting::Bounce;
+  double escapeFactor = 1.0;                ///< of the escape speed, below which MergeBelowEscape merges
   std::vector<Material<double>> materials;  ///< but for the space's own, in the order of their MaterialId
   std::vector<MaterialPair<double>> pairs;
   std::vector<SceneBody> bodies;

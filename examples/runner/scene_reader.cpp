@@ -249,11 +249,32 @@ void readSurface(TableReader& reader, MaterialReader& materials, ScenePlane& pla
   }
 }
 
-void readPlane(TableReader& reader, MaterialReader& materials, std::vector<ScenePlane>& planes) {
+/// What moves from step to step wants to know how long the step will be.
+void requireEqualSteps(TableReader& reader, const char* key, bool moves,
+                       const SimulationConfig<double>& config) {
+  if (moves && config.adaptiveTimeStep) {
+    reader.fault(key, "given", "with adaptiveTimeStep = false in [simulation]");
+  }
+}
+
+/// Of a plane or a box: how it moves.
+void readMotion(TableReader& reader, const SimulationConfig<double>& config, ScenePlane& plane) {
+  reader.vector("velocity", plane.velocity);
+  reader.vector("shake", plane.shake);
+  reader.real("shakePeriod", plane.shakePeriod, positive());
+  if (reader.has("shake") != reader.has("shakePeriod")) {
+    reader.missing(reader.has("shake") ? "\"shakePeriod\", the time of one swing to and fro"
+                                       : "\"shake\", how far it swings to each side");
+  }
+  requireEqualSteps(reader, "shake", plane.shakes(), config);
+}
+
+void readPlane(TableReader& reader, const SimulationConfig<double>& config, MaterialReader& materials,
+               std::vector<ScenePlane>& planes) {
   ScenePlane plane;
   reader.vector("normal", plane.normal);
   reader.real("offset", plane.offset);
-  reader.vector("velocity", plane.velocity);
+  readMotion(reader, config, plane);
   if (!(plane.normal.stableNorm() > 0.0)) {
     reader.faults().add(reader.where(), "\"normal\" in [[plane]] is (0, 0, 0); allowed: any direction");
   } else {
@@ -265,7 +286,8 @@ void readPlane(TableReader& reader, MaterialReader& materials, std::vector<Scene
 
 /// Up to six planes that look inwards: the faces of the box from `low` to `high`, but for the one in `open`.
 /// True if it is closed on all sides.
-bool readBox(TableReader& reader, MaterialReader& materials, std::vector<ScenePlane>& planes) {
+bool readBox(TableReader& reader, const SimulationConfig<double>& config, MaterialReader& materials,
+             std::vector<ScenePlane>& planes) {
   static const std::vector<std::string> faces{"-x", "+x", "-y", "+y", "-z", "+z"};
   Vector3<double> low = Vector3<double>::Constant(-1), high = Vector3<double>::Constant(1);
   const bool hasLow = reader.vector("low", low), hasHigh = reader.vector("high", high);
@@ -280,7 +302,7 @@ bool readBox(TableReader& reader, MaterialReader& materials, std::vector<ScenePl
   std::size_t openFace = faces.size();
   reader.choice("open", faces, openFace);
   ScenePlane look;
-  reader.vector("velocity", look.velocity);
+  readMotion(reader, config, look);
   readSurface(reader, materials, look);
   for (std::size_t face = 0; face < faces.size(); ++face) {
     if (face != openFace) {
@@ -323,6 +345,24 @@ void readDomain(TableReader& reader, Domain<double>& domain) {
     domain = Domain<double>::periodic(lengths);
   } else if (kind == 2 && hasLengths && hasOmega) {
     domain = Domain<double>::shearPeriodic(lengths, omega, vertical);
+  }
+}
+
+void readField(TableReader& reader, Scene& scene) {
+  reader.vector("acceleration", scene.field);
+  reader.vector("turn", scene.fieldTurn);
+  requireEqualSteps(reader, "turn", scene.fieldTurn != Vector3<double>::Zero(), scene.config);
+}
+
+void readCollisions(TableReader& reader, Scene& scene) {
+  static const std::vector<std::string> outcomes{"bounce", "merge", "mergeBelowEscape"};
+  std::size_t outcome = 0;
+  if (reader.choice("outcome", outcomes, outcome)) {
+    scene.meeting = static_cast<Meeting>(outcome);
+  }
+  reader.real("escapeFactor", scene.escapeFactor, positive());
+  if (reader.has("escapeFactor") && scene.meeting != Meeting::MergeBelowEscape) {
+    reader.fault("escapeFactor", "given", "with outcome = \"mergeBelowEscape\"");
   }
 }
 
@@ -373,14 +413,16 @@ Scene interpret(const toml::table& table, Faults& faults) {
     readDomain(reader, scene.domain);
     domainIsKnown = reader.isSound();
   });
-  top.table("field", [&](TableReader& reader) { reader.vector("acceleration", scene.field); });
+  top.table("field", [&](TableReader& reader) { readField(reader, scene); });
+  top.table("collisions", [&](TableReader& reader) { readCollisions(reader, scene); });
   MaterialReader materials(scene);
   top.tables("material", [&](TableReader& reader) { materials.readMaterial(reader); });
   top.tables("pair", [&](TableReader& reader) { materials.readPair(reader); });
-  top.tables("plane", [&](TableReader& reader) { readPlane(reader, materials, scene.planes); });
+  top.tables("plane", [&](TableReader& reader) { readPlane(reader, scene.config, materials, scene.planes); });
   bool enclosed = !scene.domain.isOpen() || !domainIsKnown;
-  top.tables("box",
-             [&](TableReader& reader) { enclosed = readBox(reader, materials, scene.planes) || enclosed; });
+  top.tables("box", [&](TableReader& reader) {
+    enclosed = readBox(reader, scene.config, materials, scene.planes) || enclosed;
+  });
   top.tables("body", [&](TableReader& reader) { readBody(reader, materials, scene.domain, scene.bodies); });
   top.tables("cloud", [&](TableReader& reader) { readCloud(reader, materials, scene.domain, scene.bodies); });
   top.tables("column",

@@ -179,6 +179,10 @@ std::string summary(const Scene& scene, const Space<double>& space, const Histor
                  scene.units.mass.c_str(), sceneTime(space.time(), scene.units).c_str(),
                  counted(space.steps(), "step", "steps").c_str(),
                  hasEqualSteps(space.config()) ? "equal length" : "changing length");
+  const std::size_t atStart = scene.config.bodyCount + scene.bodies.size();
+  if (space.n() < atStart) {
+    text += counted(atStart - space.n(), "body", "bodies") + format(" of %zu merged into others.\n", atStart);
+  }
   if (facts.begin > 0.0) {
     text += "Taken up at " + sceneTime(facts.begin, scene.units) +
             ": contacts, losses and drift below are those since then.\n";

@@ -43,6 +43,16 @@ pair = [{materials = ["a", "b"], restitution = 0.5}]
 plane = [{material = "a"}]
 body = [{position = [0, 0, 1], radius = 0.1, mass = 1, material = "b"}]
 end
+cat >"$2/driven.toml" <<'end'
+duration = 1
+simulation = {G = 1e-3, timeStep = 0.0078125, adaptiveTimeStep = false}
+field = {acceleration = [0, 0, -1], turn = [0, 0.5, 0]}
+collisions.outcome = "merge"
+output.frames = 0
+plane = [{shake = [0.01, 0, 0.02], shakePeriod = 0.75}]
+body = [{position = [0, 0, 0.1], radius = 0.1, mass = 1}, {position = [0, 0, 0.32], radius = 0.1, mass = 1},
+        {position = [0, 0, 0.7], radius = 0.1, mass = 1}]
+end
 cat >"$2/slow.toml" <<'end'
 duration = 2
 simulation = {G = 0, timeStep = 5}
@@ -55,6 +65,7 @@ simulation = {G = 0, timeStep = 0.1, adaptiveTimeStep = false}
 output.frames = 0
 body = [{mass = 1e200, velocity = [1e60, 0, 0]}]
 end
+sed 's/mass = 1}]/mass = 2}]/' "$2/driven.toml" >"$2/other_mass.toml"
 sed 's/normal = .*/normal = [0.1, 0, 1]/' "$2/ball.toml" >"$2/other_normal.toml"
 sed 's/friction = .*/friction = 0.25/' "$2/ball.toml" >"$2/other_surface.toml"
 sed 's/mass = 1/mass = 1\ninertia = 1/' "$2/ball.toml" >"$2/other_inertia.toml"
@@ -123,8 +134,15 @@ refuses 2 "inertia, .* of its body 0 is not the scene's" other_inertia --restart
 go pair pair_half --duration 0.5 || exit 1
 go pair pair_whole --restart "$folder/pair_half.gravel" || exit 1
 refuses 2 "its pair of materials 1 and 2 is not the scene" other_pair --restart "$folder/pair_half.gravel"
+go driven driven_whole || exit 1
+go driven driven_half --duration 0.5 || exit 1
+go driven driven_halves --restart "$folder/driven_half.gravel" || exit 1
+cmp "$folder/driven_whole.gravel" "$folder/driven_halves.gravel" || exit 1
+grep -q "^1 body of 3 merged" "$folder/driven_half/summary.txt" && grep -q "^2 bodies of 3 merged" \
+  "$folder/driven_halves/summary.txt" || { echo "no two mergers, one before the restart and one after it"; exit 1; }
+refuses 2 "its mass is 3, the scene's 4" other_mass --restart "$folder/driven_half.gravel"
 refuses 2 "is the state at time 2; allowed: one before the end, 2" grains --restart "$folder/whole.gravel"
-refuses 1 "grains.toml" grains --restart "$folder/grains.toml"
+refuses 1 "^gravel-run: the snapshot .*grains.toml" grains --restart "$folder/grains.toml"
 refuses 1 "cannot save to .*: it is a folder" grains --save "$folder/whole"
 
 mkdir "$folder/place.gravel.part"

@@ -1,0 +1,31 @@
+#include "drive.hpp"
+
+namespace gravel::runner {
+
+namespace {
+
+/// Along its normal a plane wants the mean velocity of the step, across it that of the step's end.
+Vector3<double> velocityOf(const ScenePlane& plane, double time, double h) {
+  const double omega = 2.0 * pi<double>() / plane.shakePeriod;
+  const double mean = (std::sin(omega * (time + h)) - std::sin(omega * time)) / h;
+  const double end = omega * std::cos(omega * (time + h));
+  const Vector3<double> along = plane.normal.dot(plane.shake) * plane.normal;
+  return plane.velocity + mean * along + end * (plane.shake - along);
+}
+
+}  // namespace
+
+void drive(Space<double>& space, const Scene& scene, double h) {
+  const double time = space.time();
+  for (std::size_t k = 0; k < scene.planes.size(); ++k) {
+    if (scene.planes[k].shakes()) {
+      space.setPlaneVelocity(k, velocityOf(scene.planes[k], time, h));
+    }
+  }
+  const double turns = scene.fieldTurn.norm();
+  if (turns > 0.0) {  // that of the middle stands for the step
+    space.setUniformField(Eigen::AngleAxisd(turns * (time + 0.5 * h), scene.fieldTurn / turns) * scene.field);
+  }
+}
+
+}  // namespace gravel::runner

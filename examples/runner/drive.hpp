@@ -1,0 +1,13 @@
+#pragma once
+
+/// \file
+/// What a scene moves by itself from step to step: planes that shake, a field that turns.
+
+#include "scene.hpp"
+
+namespace gravel::runner {
+
+/// Gives the space the field and the velocities of planes of the next step, which must have the length h.
+void drive(Space<double>& space, const Scene& scene, double h);
+
+}  // namespace gravel::runner
