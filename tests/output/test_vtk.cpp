@@ -97,6 +97,7 @@ Bodies<Scalar, Layout> someBodies(std::size_t n) {
     body.angularVelocity = {0, x, Scalar(0.5)};
     body.mass = x + 1;
     body.radius = Scalar(0.125) * (x + 1);
+    body.orientation = gravel::Quaternion<Scalar>(Scalar(0.5), Scalar(0.5), Scalar(-0.5), Scalar(0.5));
     bodies.add(body);
   }
   return bodies;
@@ -120,13 +121,14 @@ TEMPLATE_TEST_CASE("A frame holds what the bodies hold, exactly", "[vtk]", (Case
   gravel::vtkPoints(bodies).write(folder.path() / "a.vtp");
   const auto arrays = readVtp(folder.path() / "a.vtp");
 
-  CHECK(arrays.size() == 8);
-  for (const auto& name : {"Points", "velocity", "angularVelocity", "radius", "mass"}) {
+  CHECK(arrays.size() == 9);
+  for (const auto& name : {"Points", "velocity", "angularVelocity", "orientation", "radius", "mass"}) {
     CHECK(arrays.at(name).type == (sizeof(Number) == 4 ? "Float32" : "Float64"));
   }
   CHECK(arrays.at("id").type == "UInt64");
   CHECK(arrays.at("Points").width == 3);
   CHECK(arrays.at("mass").width == 1);
+  CHECK(arrays.at("orientation").width == 4);
   for (std::size_t i = 0; i < 5; ++i) {
     for (std::size_t k = 0; k < 3; ++k) {
       const auto axis = static_cast<Eigen::Index>(k);
@@ -135,6 +137,9 @@ TEMPLATE_TEST_CASE("A frame holds what the bodies hold, exactly", "[vtk]", (Case
             static_cast<Number>(bodies.velocities()[i][axis]));
       CHECK(arrays.at("angularVelocity").value<Number>(3 * i + k) ==
             static_cast<Number>(bodies.angularVelocities()[i][axis]));
+    }
+    for (std::size_t k = 0; k < 4; ++k) {  // w, x, y, z: y alone is below zero
+      CHECK(arrays.at("orientation").value<Number>(4 * i + k) == (k == 2 ? Number(-0.5) : Number(0.5)));
     }
     CHECK(arrays.at("radius").value<Number>(i) == static_cast<Number>(bodies.radii()[i]));
     CHECK(arrays.at("mass").value<Number>(i) == static_cast<Number>(bodies.masses()[i]));
@@ -148,7 +153,7 @@ TEST_CASE("A frame of no bodies is a file with empty arrays", "[vtk]") {
   const Folder folder("empty");
   gravel::vtkPoints(Bodies<double>()).write(folder.path() / "a.vtp");
   const auto arrays = readVtp(folder.path() / "a.vtp");
-  REQUIRE(arrays.size() == 8);
+  REQUIRE(arrays.size() == 9);
   for (const auto& [name, array] : arrays) {
     CHECK(array.bytes.empty());
   }

@@ -170,7 +170,24 @@ class VtkPoints {
   std::string data_, pointsXml_, fieldsXml_;
 };
 
-/// Points with radius, mass, velocity, angularVelocity and id of every body.
+namespace detail {
+
+/// Quaternions as VTK takes them: w, x, y, z.
+template <class Quaternions>
+struct VtkQuaternions {
+  Quaternions column;
+
+  std::size_t size() const { return column.size(); }
+  auto operator[](std::size_t i) const {
+    const auto q = column[i];
+    return Eigen::Matrix<std::remove_cvref_t<decltype(q.w())>, 4, 1>(q.w(), q.x(), q.y(), q.z());
+  }
+};
+
+}  // namespace detail
+
+/// Points with radius, mass, velocity, angularVelocity, orientation (a quaternion w, x, y, z, by which
+/// ParaView turns glyphs in the mode "Quaternion") and id of every body.
 template <class Bodies>
 VtkPoints vtkPoints(const Bodies& bodies) {
   VtkPoints points(bodies.positions());
@@ -178,6 +195,7 @@ VtkPoints vtkPoints(const Bodies& bodies) {
   points.add("mass", bodies.masses());
   points.add("velocity", bodies.velocities());
   points.add("angularVelocity", bodies.angularVelocities());
+  points.add("orientation", detail::VtkQuaternions<decltype(bodies.orientations())>{bodies.orientations()});
   points.add("id", bodies.ids());
   return points;
 }
