@@ -18,6 +18,7 @@ struct SceneBody {
   std::string name;  ///< empty for the bodies of a generator
   Colour colour = Colour(0.36F, 0.32F, 0.27F);
   Surface surface = Surface::Rock;
+  bool flow = false;  ///< its velocity counts from the flow of the shear-periodic domain
 };
 
 /// It goes the way velocity t + shake sin(2 pi t/shakePeriod).

@@ -59,8 +59,9 @@ void readSimulation(TableReader& reader, SimulationConfig<double>& config) {
   }
 }
 
-/// What a body, or each body of a generator, is made of and looks like.
+/// What a body, or each body of a generator, is made of and looks like, and what it moves in.
 void readLook(TableReader& reader, const MaterialReader& materials, SceneBody& look) {
+  reader.flag("flow", look.flow);
   look.body.material = materials.named(reader);
   static const std::vector<std::string> surfaces{"rock", "smooth", "striped", "glowing"};
   std::size_t surface = static_cast<std::size_t>(look.surface);
@@ -429,6 +430,16 @@ Scene interpret(const toml::table& table, Faults& faults) {
              [&](TableReader& reader) { readColumn(reader, materials, scene.domain, scene.bodies); });
   top.tables("gas",
              [&](TableReader& reader) { readGas(reader, materials, enclosed, scene.domain, scene.bodies); });
+  bool flows = false;
+  for (SceneBody& entry : scene.bodies) {
+    if (entry.flow) {  // what is at rest lacks it
+      entry.body.velocity -= scene.domain.lessFlow(entry.body.position, Vector3<double>::Zero());
+      flows = true;
+    }
+  }
+  if (flows && domainIsKnown && scene.domain.kind() != DomainKind::ShearPeriodic) {
+    top.missing("[domain] of kind \"shearPeriodic\", whose the \"flow\" is");
+  }
   top.table("output", [&](TableReader& reader) {
     reader.count("frames", scene.output.frames, 0, mostRecords);
     reader.count("rows", scene.output.rows, 0, mostRecords);

@@ -7,6 +7,7 @@
 #include <gravel/space/space.hpp>
 
 #include <algorithm>
+#include <array>
 #include <string>
 #include <utility>
 
@@ -153,6 +154,153 @@ TEST_CASE("The work of a user's force that depends on the place is of second ord
   CHECK(coarse > 1e-5);  // of 3.7 J
   CHECK(coarse < 2e-3);
   CHECK(fine < coarse / 32);  // 64 at order 2, 8 at order 1
+}
+
+namespace {
+
+/// A ball of radius 1/2 and mass 1 above a floor, under gravity and a torque.
+Space<double> ballUnderTorque(SimulationConfig<double> config, double height, const Vec& torque) {
+  Space<double> space(config);
+  space.setUniformField({0, 0, -9.81});
+  space.addPlane({0, 0, 1}, 0);
+  space.addBody(at({0, 0, 0.5 + height}, {0, 0, 0}, 0.5));
+  space.setForceHook([torque](Bodies<double, SoA>& bodies, double) { bodies[0].torque() += torque; });
+  return space;
+}
+
+}  // namespace
+
+// What friction gives in the second half of a step is no share of what the torque did in the kick before.
+// Seen to fail: that left out (friction tau^2 h/(4 I) a second at rest, 0.08 J in 10 s; 0.29 J in the roll).
+TEST_CASE("A torque against which friction holds a ball does no work, and one that rolls it loses none") {
+  const std::size_t parts = GENERATE(1U, 3U);
+  SimulationConfig<double> config = quiet(0.02);
+  config.contactSubsteps = parts;
+  config.coeffFriction = config.coeffStaticFriction = 0.5;
+  Space<double> rolls = ballUnderTorque(config, 0, {0, 2, 0});
+  const double start = rolls.energyLedger().total();
+  rolls.advanceTo(2.0);
+  CHECK_THAT(rolls.body(0).angularVelocity()[1], WithinRel(4 / (0.1 + 0.25), 1e-12));  // tau t/(I + m R^2)
+  CHECK_THAT(rolls.energyLedger().friction, WithinAbs(0.0, 1e-11));
+  CHECK_THAT(rolls.energyLedger().total(), WithinAbs(start, 1e-11));
+
+  config.rollingFriction = config.spinningFriction = 0.1;
+  for (const Vec& torque : {Vec(0, 0.4, 0), Vec(0, 0, 0.4)}) {
+    Space<double> rests = ballUnderTorque(config, 0, torque);
+    const double before = rests.energyLedger().total();
+    rests.advanceTo(10.0);
+    CHECK(rests.body(0).angularVelocity().norm() < 1e-15);
+    CHECK_THAT(rests.energyLedger().friction, WithinAbs(0.0, 1e-12));
+    CHECK_THAT(rests.energyLedger().total(), WithinAbs(before, 1e-12));
+  }
+}
+
+// A blow meets the spin of its moment, tau t/I, whenever in a step it comes. Seen to fail: the spin of the
+// step's middle (v off by up to (2/7) R (tau/I) h/2, 0.014 m/s).
+TEST_CASE("A ball that a torque spins bounces with the spin that it has by then, whatever the step") {
+  for (const double mu : {1.0, 0.05}) {  // sticks, slides
+    for (double height = 0.9; height < 1.1; height += 0.023) {
+      SimulationConfig<double> config = quiet(0.02);
+      config.coeffRestitution = 0.8;
+      config.coeffFriction = config.coeffStaticFriction = mu;
+      Space<double> space = ballUnderTorque(config, height, {0, 1, 0});
+      const double start = space.energyLedger().total();
+      space.advanceTo(0.6);
+      const double inertia = 0.1;
+      const double met = std::sqrt(2 * height / 9.81);
+      const double spin = met / inertia;
+      const double impulse = std::min(2.0 / 7 * 0.5 * spin, mu * 1.8 * 9.81 * met);
+      CHECK_THAT(space.body(0).velocity()[0], WithinAbs(impulse, 1e-12));
+      CHECK_THAT(space.body(0).angularVelocity()[1],
+                 WithinAbs(0.6 / inertia - 0.5 * impulse / inertia, 1e-11));
+      CHECK_THAT(space.energyLedger().total(), WithinAbs(start, 1e-11));
+    }
+  }
+}
+
+// A drag turns round with the velocity in each blow, so that the mean of it before and after is nothing. Seen
+// to fail: (F_0 + F_1).x/2 (3.1 and 0.39 J); without what forces do in LateBlows (0.18 and 0.023 J).
+TEST_CASE("The work of a drag is of second order where bodies bounce") {
+  const auto off = [](double h) {
+    Space<double> space = box(quiet(h), 40);
+    space.setForceHook([](Bodies<double, SoA>& bodies, double) {
+      for (std::size_t i = 0; i < bodies.size(); ++i) {
+        bodies[i].force() -= bodies[i].mass() * (Vec(0, 0, 9.81) + 0.8 * Vec(bodies[i].velocity()));
+      }
+    });
+    return offAndMoved(space, 1.5).first;
+  };
+  const double coarse = off(8e-3);
+  const double fine = off(1e-3);
+  CAPTURE(coarse, fine);
+  CHECK(coarse < 0.1);
+  CHECK(fine < coarse / 24);  // 64 at order 2, 8 at order 1
+}
+
+// Seen to fail: forces of the hook left by index (4e-3 J).
+TEST_CASE("A new order of bodies leaves each of them the user's force that it has") {
+  Space<double> space(quiet(0.01));
+  for (int i = 0; i < 8; ++i) {
+    space.addBody(at({1.0 * (7 - i), -3.0 * (i % 3), 2.0 * (i % 2)}, {0.1 * i, 0, 0}, 0.1));
+  }
+  space.setForceHook([](Bodies<double, SoA>& bodies, double) {
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      bodies[i].force()[0] += static_cast<double>(toInteger(BodyId(bodies[i].id())) % 3);
+    }
+  });
+  const double start = space.energyLedger().total();
+  for (int k = 0; k < 20; ++k) {
+    space.computeDynamics(0);
+    if (k % 5 == 0) {
+      space.reorderBodies();
+      CHECK(toInteger(BodyId(space.body(std::size_t{0}).id())) != 0);
+    }
+  }
+  CHECK_THAT(space.energyLedger().total(), WithinAbs(start, 1e-13));
+}
+
+// The kick works on velocities that the correction has changed. Seen to fail: without the user's share in
+// that (6e-4 J).
+TEST_CASE("Overlaps are opened under a user's force as under a field") {
+  SimulationConfig<double> config = quiet(0.01);
+  config.coeffRestitution = 0;
+  Space<double> space(config);
+  space.addBody(at({0, 0, 0}, {0, 1, 0}, 1));
+  space.addBody(at({1.5, 0, 0}, {0, -1, 0}, 1));
+  space.setForceHook([](Bodies<double, SoA>& bodies, double) { bodies[0].force() += Vec(0, 1, 0); });
+  const double start = space.energyLedger().total();
+  space.computeDynamics(0);
+  CHECK(space.energyLedger().correction > 0.01);
+  CHECK_THAT(space.energyLedger().total(), WithinAbs(start, 1e-14));
+}
+
+// Velocities jump by (3/2) Omega Lx at the edge, in any part. Seen to fail: the power at both ends of the
+// step alone (F dv h (1/2 - k/n), 0.06 J); by the way without the jump (0.12 J).
+TEST_CASE("A body that crosses the edge of a patch takes the user's constant force with it") {
+  const auto [parts, touching] =
+      GENERATE(table<std::size_t, bool>({{1, false}, {2, false}, {4, false}, {1, true}, {4, true}}));
+  SimulationConfig<double> config = quiet(0.04);
+  config.integrator = IntegratorKind::SymplecticEpicycle;
+  config.contactSubsteps = parts;
+  Space<double> space(config);
+  space.setDomain(Domain<double>::shearPeriodic({8, 8, 8}, 1.0));
+  const BodyId crosses = space.addBody(at({3.5, 0, 0}, {1, -1.5 * 3.5, 0}, 0.1));
+  std::array<BodyId, 2> pressed{crosses, crosses};
+  if (touching) {  // by two that are pressed together: then work is booked by the way
+    pressed = {space.addBody(at({0, -0.5, 0}, {0, 0, 0}, 0.5)),
+               space.addBody(at({0, 0.5, 0}, {0, 0, 0}, 0.5))};
+  }
+  space.setForceHook([crosses, pressed](Bodies<double, SoA>& bodies, double) {
+    bodies[bodies.indexOf(pressed[0])].force() += Vec(0, 1, 0);
+    bodies[bodies.indexOf(pressed[1])].force() -= Vec(0, 1, 0);
+    bodies[bodies.indexOf(crosses)].force() += Vec(0, 0.5, 0);
+  });
+  const double start = space.energyLedger().total();
+  space.advanceTo(1.0);
+  CHECK(space.body(crosses).position()[0] < 0);
+  CHECK(space.contactCount() == (touching ? 1 : 0));
+  CAPTURE(parts, touching);
+  CHECK_THAT(space.energyLedger().total(), WithinAbs(start, touching ? 2e-6 : 1e-12));
 }
 
 namespace {

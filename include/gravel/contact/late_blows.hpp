@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace gravel {
@@ -51,10 +52,14 @@ class LateBlows {
 
   /// Makes up for all that were taken. \param bodies with the accelerations a_1, at the end of the step
   /// \param time [s] of that, for a sheared domain  \param h [s] from a_0 to a_1
-  /// \param impulseOf  the impulse of the blow of a place  \return loss to restitution [J]
-  template <ContactBodies B, class ImpulseOf>
-  S makeUp(B& bodies, const Domain<S>& domain, const S& time, const S& h, ImpulseOf&& impulseOf) {
+  /// \param impulseOf  the impulse of the blow of a place
+  /// \param change  of a body, the part of a_1 - a_0 of forces without a potential [m s^-2]
+  /// \return loss to restitution, and the work that such forces did thereby [J]
+  template <ContactBodies B, class ImpulseOf, class Change>
+  std::pair<S, S> makeUp(B& bodies, const Domain<S>& domain, const S& time, const S& h, ImpulseOf&& impulseOf,
+                         Change&& change) {
     S loss(0);
+    S work(0);
     for (const Blow& blow : blows_) {
       const bool sticks = blow.decided && blow.parting == S(0);
       const S since = sticks ? blow.time : S(blow.time - h / S(2));
@@ -90,9 +95,15 @@ class LateBlows {
         jn += share.effective * dv;
       }
       loss += share.effective * (blow.speed - kept * parting) * du;
+      // Motion and loss have J du more, of which that much is no potential's.
+      S along = share.second > S(0) ? S(-n.dot(Vector3<S>(change(blow.second)))) : S(0);
+      if (share.first > S(0)) {
+        along += n.dot(Vector3<S>(change(blow.first)));
+      }
+      work += share.effective * (blow.speed + parting) * along * since / S(2);
     }
     blows_.clear();
-    return loss;
+    return {loss, work};
   }
 
  private:

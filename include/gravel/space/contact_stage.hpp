@@ -145,7 +145,14 @@ class ContactStage {
   /// The impacts of a drift are dealt; \param start [s] of it, since forces were last found.
   void keepBlows(const Bodies& bodies, const Scalar& start);
   /// Forces have been found anew, h [s] after that: what blows since then lacked is made up (LateBlows).
-  void makeUpBlows(Bodies& bodies, const Scalar& time, const Scalar& h);
+  /// \param change  [m s^-2] of a body's acceleration by forces of the user's  \return their share in that
+  /// [J]
+  template <class Change>
+  Scalar makeUpBlows(Bodies& bodies, const Scalar& time, const Scalar& h, Change&& change);
+  /// What the blows of the drift that is to come did to spins.
+  std::span<const TurnChange<Scalar>> turns() const { return impacts_.turns(); }
+  /// What the last solve() gave to the work that present torques did just before [J]: see bookKick().
+  Scalar torqueWork(const Bodies& bodies, const Scalar& kick) const;
 
   /// A part of the step is over that began `start` [s] after it. \param last  no other one follows
   void endPart(const Scalar& start, bool last);

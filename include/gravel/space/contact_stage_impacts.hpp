@@ -105,7 +105,10 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
       const auto partner = [&](std::uint32_t i, std::uint64_t id, const Vector3<Scalar>& v) {
         const Vector3<Scalar> start = detail::spinOf(bodies, i);
         const bool movable = detail::isMovable(bodies, i);
-        const Vector3<Scalar> w = movable ? Vector3<Scalar>(course.spinAt(start, impact.time)) : start;
+        const Vector3<Scalar> byTorque =
+            Vector3<Scalar>(bodies.angularAccelerations()[i]) * (impact.time - h / Scalar(2));
+        const Vector3<Scalar> w =
+            movable ? Vector3<Scalar>(course.spinAt(start, impact.time) + byTorque) : start;
         return typename Collision<Scalar>::Partner{
             BodyId{id}, bodies.masses()[i], bodies.radii()[i], !movable, MaterialId{bodies.materials()[i]}, v,
             w};
@@ -143,12 +146,16 @@ void ContactStage<Scalar, Layout>::keepBlows(const Bodies& bodies, const Scalar&
 }
 
 template <Real Scalar, class Layout>
-void ContactStage<Scalar, Layout>::makeUpBlows(Bodies& bodies, const Scalar& time, const Scalar& h) {
+template <class Change>
+Scalar ContactStage<Scalar, Layout>::makeUpBlows(Bodies& bodies, const Scalar& time, const Scalar& h,
+                                                 Change&& change) {
   const std::size_t before = record_.impacts().size();
-  report_.restitutionLoss +=
-      late_.makeUp(bodies, domain, time, h, [&](std::size_t k) -> ContactImpulse<Scalar>& {
-        return k < before ? record_.impacts()[k].impulse : impacts_.impacts()[k - before].impulse;
-      });
+  const auto impulseOf = [&](std::size_t k) -> ContactImpulse<Scalar>& {
+    return k < before ? record_.impacts()[k].impulse : impacts_.impacts()[k - before].impulse;
+  };
+  const auto [loss, work] = late_.makeUp(bodies, domain, time, h, impulseOf, change);
+  report_.restitutionLoss += loss;
+  return work;
 }
 
 template <Real Scalar, class Layout>

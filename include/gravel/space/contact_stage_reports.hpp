@@ -8,8 +8,8 @@
 namespace gravel {
 
 /// What changes velocities between drift and kick changes the kick's work by F.dv kick, for which no drift
-/// takes anything out of the potential (a hook does its work on the way of drifts alone: HookWork). Of two
-/// movable spheres these cancel in a uniform field; a fixed one takes its part away.
+/// takes anything out of the potential, nor out of a hook's work, which is done on the way of drifts alone
+/// (HookWork). Of two movable spheres these cancel in a uniform field; a fixed one takes its part away.
 template <Real Scalar, class Layout>
 Scalar ContactStage<Scalar, Layout>::separationWork(const ForceStage<Scalar, Layout>& force,
                                                     const Bodies& bodies, Scalar kick) const {
@@ -22,7 +22,7 @@ Scalar ContactStage<Scalar, Layout>::separationWork(const ForceStage<Scalar, Lay
       for (std::size_t k = begin; k < end; ++k) {
         const Displacement<Scalar>& d = all[k];
         const Vector3<Scalar> F = force.conservativeForce(bodies, d.body);
-        sum += F.dot(d.shift) - kick * F.dot(d.change);
+        sum += F.dot(d.shift) - kick * Vector3<Scalar>(bodies.forces()[d.body]).dot(d.change);
         if (frame.turns()) {
           const Vector3<Scalar> x = bodies[d.body].position();
           sum += Scalar(bodies[d.body].mass()) * (frame.potential(x - d.shift) - frame.potential(x));
@@ -46,6 +46,25 @@ void ContactStage<Scalar, Layout>::bookKick(const Bodies& bodies, const Scalar& 
   });
   report_.restitutionLoss += losses[0];
   report_.frictionLoss += losses[1];
+}
+
+/// So it is with torques, whose work HookWork takes to be the mean power at both ends of the step, the second
+/// one after the impulses of the second half. These the kick before them has not seen.
+template <Real Scalar, class Layout>
+Scalar ContactStage<Scalar, Layout>::torqueWork(const Bodies& bodies, const Scalar& kick) const {
+  if (contacts_.empty()) {
+    return Scalar(0);
+  }
+  return kick * orderedSum(bodies.size(), 512, Scalar(0), [&](std::size_t begin, std::size_t end) {
+           Scalar power(0);
+           for (std::size_t i = begin; i < end; ++i) {
+             const auto body = static_cast<std::uint32_t>(i);
+             if (solver_.knows(body)) {
+               power += Vector3<Scalar>(bodies.torques()[i]).dot(solver_.turnOf(body));
+             }
+           }
+           return power;
+         });
 }
 
 template <Real Scalar, class Layout>

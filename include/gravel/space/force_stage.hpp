@@ -142,6 +142,15 @@ class ForceStage {
     }
     return parts;
   }
+  /// Bodies are in a new order: that at order[i] stands at i.
+  void reorder(std::span<const std::size_t> order) {
+    if (hookForces_.size() == order.size()) {
+      const std::vector<Vector3<Scalar>> before = hookForces_;
+      for (std::size_t i = 0; i < order.size(); ++i) {
+        hookForces_[i] = before[order[i]];
+      }
+    }
+  }
   void setHookParts(const std::vector<Scalar>& parts) {
     hookForces_.clear();
     for (std::size_t i = 0; i + 2 < parts.size(); i += 3) {

@@ -4,6 +4,7 @@
 /// What the user's own forces do to the energy of motion in a step.
 
 #include <gravel/bodies/bodies.hpp>
+#include <gravel/contact/impact.hpp>
 #include <gravel/core/parallel.hpp>
 #include <gravel/dynamics/integrator.hpp>
 
@@ -13,12 +14,18 @@
 
 namespace gravel {
 
-/// Kicks at both ends of a free drift do the mean of a force at both ends times the way in between, however
-/// blows have bent it, but for (h^2/8m)(F_1^2 - F_0^2), which cancels from step to step. Where velocities
-/// turn on the way, along an epicycle or an orbit, they do the mean power at both ends; so does what comes
-/// near the integral of the power on smooth ways in several drifts, whose ends cancel. But that is off by
-/// F.(v after - v before) times a part of the step where something bounces: there the way counts. Of torques
-/// it is the mean power always, as how far a body turned is not known.
+/// Under a force F_0 that is held for h, in one part or several, the work is F_0 times the way x, however
+/// blows bend it: they meet the velocities that F_0 gives by then. The last kick makes up for what has
+/// become of the force, F_1 - F_0, and does (F_1 - F_0).v h/2 with v the velocity of the step's middle that
+/// the last drift leaves; so that the sum is
+///     F_0.x + (F_1 - F_0).v h/2,
+/// but for (h^2/8m)(F_1^2 - F_0^2), which cancels from step to step. (F_0 + F_1).x/2, the same where nothing
+/// bounces, is off by one sign where a force turns with the velocity in a blow, as drag does: by (F_1 -
+/// F_0).(v after - v before) h/4.) Where velocities turn on the way, along an epicycle or an orbit, kicks do
+/// the mean power at both ends of each part; so does what comes near the integral of the power on smooth ways
+/// in several drifts, whose ends cancel. But that is off by F.(v after - v before) times a part of the step
+/// where something bounces: there the way counts. Of torques it is the mean power, and for a blow at t that
+/// gives the spin dw, torque.dw (h/2 - t) besides.
 template <Real Scalar, class Layout>
 class HookWork {
  public:
@@ -28,10 +35,16 @@ class HookWork {
   /// \param forces [N] at the start, by body; what is missing counts as 0, as where none were asked for yet
   /// \param free  bodies drift straight ahead, once
   void begin(const Bodies& bodies, Forces forces, bool free) {
+    const std::size_t n = bodies.size();
     forces_.assign(forces.begin(), forces.end());
-    ways_.assign(bodies.size(), Vector3<Scalar>::Zero());
-    places_.resize(bodies.size());
-    power_ = powerOf(bodies, forces_);
+    torques_.resize(n);
+    parallelFor(n, detail::bodyGrain, [&](std::size_t i) { torques_[i] = bodies[i].torque(); });
+    ways_.assign(n, Vector3<Scalar>::Zero());
+    places_.resize(n);
+    middles_.resize(n);
+    power_ = powerOf(bodies, forces_, torques_);
+    done_ = Sums::Zero();
+    crossed_ = Scalar(0);
     time_ = Scalar(0);
     byWay_ = free;
   }
@@ -41,29 +54,71 @@ class HookWork {
     parallelFor(bodies.size(), detail::bodyGrain, [&](std::size_t i) { places_[i] = bodies[i].position(); });
   }
   void arrive(const Bodies& bodies, const Scalar& time) {
-    parallelFor(bodies.size(), detail::bodyGrain,
-                [&](std::size_t i) { ways_[i] += Vector3<Scalar>(bodies[i].position()) - places_[i]; });
+    late_ = time_ / Scalar(2);
+    parallelFor(bodies.size(), detail::bodyGrain, [&](std::size_t i) {
+      const auto body = bodies[i];
+      ways_[i] += Vector3<Scalar>(body.position()) - places_[i];
+      middles_[i] = Vector3<Scalar>(body.velocity()) - late_ * Vector3<Scalar>(body.acceleration());
+    });
     time_ += time;
+  }
+  /// Velocities jumped where bodies crossed the edge of a sheared domain, before the last kick of a part of
+  /// `time` [s], which works on what they are now.
+  void cross(const Bodies& bodies, const Scalar& time) {
+    crossed_ += sumOver(bodies, Scalar(0), [&](std::size_t i) {
+      const auto body = bodies[i];
+      const Vector3<Scalar> jump =
+          Vector3<Scalar>(body.velocity()) - late_ * Vector3<Scalar>(body.acceleration()) - middles_[i];
+      middles_[i] += jump;
+      return body.inverseMass() > Scalar(0) ? Scalar(of(forces_, i).dot(jump) * (time / Scalar(2)))
+                                            : Scalar(0);
+    });
+  }
+  /// Blows of a drift of `time` [s] that is to come changed spins.
+  void turn(std::span<const TurnChange<Scalar>> turns, const Scalar& time) {
+    for (const TurnChange<Scalar>& turn : turns) {
+      done_[1] +=
+          torques_[turn.body].dot(Vector3<Scalar>(turn.after - turn.before)) * (time / Scalar(2) - turn.time);
+    }
+  }
+  /// A part of `time` [s] is over.
+  void endPart(const Bodies& bodies, const Scalar& time) {
+    const Sums power = powerOf(bodies, forces_, torques_);
+    done_ += (power_ + power) * (time / Scalar(2));
+    power_ = power;
   }
   /// Something touches: velocities have jumped.
   void bend() { byWay_ = true; }
 
-  /// [J] since the last begin(). \param forces [N] at the end
-  Scalar end(const Bodies& bodies, Forces forces) const {
-    using Sums = Eigen::Array<Scalar, 2, 1>;
-    const Sums power = powerOf(bodies, forces) + power_;
+  /// [m s^-2] by which a force that is now `forces` differs from what it was.
+  Vector3<Scalar> changeOf(const Bodies& bodies, Forces forces, std::size_t i) const {
+    return (of(forces, i) - of(forces_, i)) * bodies[i].inverseMass();
+  }
+
+  /// [J] since the last begin(), after the last endPart(). \param forces [N] at the end
+  Scalar end(const Bodies& bodies, Forces forces) {
+    parallelFor(bodies.size(), detail::bodyGrain, [&](std::size_t i) { torques_[i] = bodies[i].torque(); });
+    const Scalar half = time_ / Scalar(2);
+    const Sums change = (powerOf(bodies, forces, torques_) - power_) * half;
     const Scalar pushed =
-        byWay_ ? sumOver(bodies, Scalar(0),
-                         [&](std::size_t i) {
-                           return bodies[i].inverseMass() > Scalar(0)
-                                      ? Scalar(Vector3<Scalar>(of(forces_, i) + of(forces, i)).dot(ways_[i]))
-                                      : Scalar(0);
-                         })
-               : Scalar(power[0] * time_);
-    return (pushed + power[1] * time_) / Scalar(2);
+        byWay_
+            ? crossed_ +
+                  sumOver(
+                      bodies, Scalar(0),
+                      [&](std::size_t i) {
+                        return bodies[i].inverseMass() > Scalar(0)
+                                   ? Scalar(of(forces_, i).dot(ways_[i]) +
+                                            Vector3<Scalar>(of(forces, i) - of(forces_, i)).dot(middles_[i]) *
+                                                half)
+                                   : Scalar(0);
+                      })
+            : Scalar(done_[0] + change[0]);
+    return pushed + done_[1] + change[1];
   }
 
  private:
+  using Sums = Eigen::Array<Scalar, 2, 1>;
+
   static Vector3<Scalar> of(Forces forces, std::size_t i) {
     return i < forces.size() ? forces[i] : Vector3<Scalar>(Vector3<Scalar>::Zero());
   }
@@ -81,21 +136,24 @@ class HookWork {
   }
 
   /// Of forces and of torques at the present velocities and spins [W].
-  static Eigen::Array<Scalar, 2, 1> powerOf(const Bodies& bodies, Forces forces) {
-    using Sums = Eigen::Array<Scalar, 2, 1>;
+  static Sums powerOf(const Bodies& bodies, Forces forces, Forces torques) {
     return sumOver(bodies, Sums(Sums::Zero()), [&](std::size_t i) {
       const auto body = bodies[i];
       const auto product = [](bool moves, const Vector3<Scalar>& force, const Vector3<Scalar>& velocity) {
         return moves ? Scalar(force.dot(velocity)) : Scalar(0);
       };
       return Sums(product(body.inverseMass() > Scalar(0), of(forces, i), body.velocity()),
-                  product(body.inverseInertia() > Scalar(0), body.torque(), body.angularVelocity()));
+                  product(body.inverseInertia() > Scalar(0), of(torques, i), body.angularVelocity()));
     });
   }
 
-  std::vector<Vector3<Scalar>> forces_, ways_, places_;  ///< by body: [N] at the start, [m], [m]
-  Eigen::Array<Scalar, 2, 1> power_ = Eigen::Array<Scalar, 2, 1>::Zero();  ///< [W] at the start
-  Scalar time_ = Scalar(0);                                                ///< [s] since then
+  std::vector<Vector3<Scalar>> forces_, torques_, ways_, places_;  ///< by body; [N], [N m] at the start
+  std::vector<Vector3<Scalar>> middles_;  ///< [m s^-1] of the step's middle, as the last drift leaves it
+  Sums power_ = Sums::Zero();             ///< [W] at the start of the part
+  Sums done_ = Sums::Zero();              ///< [J] until then
+  Scalar crossed_ = Scalar(0);            ///< [J] that the way leaves out
+  Scalar time_ = Scalar(0);               ///< [s] since the start
+  Scalar late_ = Scalar(0);               ///< [s] by which the last drift was later than the step's middle
   bool byWay_ = true;
 };
 

@@ -82,7 +82,9 @@ template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::reorderBodies() {
   this->inStep_.refuse("reorderBodies()");
   forcesValid_ = forcesValid_ && !placesChanged();
-  bodies_.reorder(mortonOrder(bodies_.positions()));
+  const std::vector<std::size_t> order = mortonOrder(bodies_.positions());
+  bodies_.reorder(order);
+  force_.reorder(order);
   contact_.renumber(bodies_);
   if (forcesValid_) {  // they moved along with their bodies
     rememberPlaces();

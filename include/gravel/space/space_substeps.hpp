@@ -57,6 +57,9 @@ struct Space<Scalar, Layout>::Departure {
     space->contact_.strike(space->bodies_, space->config_, HillFrame<Scalar>(space->contact_.domain),
                            Scalar(space->time_ + start), h, part, space->profiler_);
     space->contact_.keepBlows(space->bodies_, since);
+    if (space->force_.hook) {
+      space->force_.hookWork.turn(space->contact_.turns(), h);
+    }
   }
 };
 
@@ -191,6 +194,9 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
     }
     contact_.boundaries.advance(contact_dt_, halves(2 * part + 1));
     left_.work -= contact_.wrap(bodies_, Scalar(time_ + end), force_.field);
+    if (works && frame.turns()) {
+      force_.hookWork.cross(bodies_, contact_dt_);
+    }
     contact_.detect(bodies_, this->config_, Scalar(time_ + end), contact_dt_, true, profiler_);
     contact_.separate(bodies_, this->config_, Scalar(time_ + end), profiler_);
   };
@@ -210,21 +216,30 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
   }
   rememberPlaces();
   left_.correction += contact_.separationWork(force_, bodies_, Scalar(contact_dt_ / Scalar(2)));
+  const auto makeUpBlows = [&](const Scalar& since) {
+    left_.work -= contact_.makeUpBlows(bodies_, Scalar(time_ + end), since, [&](std::size_t i) {
+      return works ? force_.hookWork.changeOf(bodies_, force_.hookForces(), i) : Vector(Vector::Zero());
+    });
+  };
   if (!held) {
-    contact_.makeUpBlows(bodies_, Scalar(time_ + end), span);
+    makeUpBlows(span);
   }
   const std::vector<std::pair<BodyId, BodyId>> merges = decideCollisions(Scalar(time_ + end));
   const bool anew = !last && !merges.empty();  // forces are found once more
   if (anew && held) {
     const Scalar passed = end - found;
     find(contact_dt_, passed, Scalar(passed / Scalar(2)), {});
-    contact_.makeUpBlows(bodies_, Scalar(time_ + end), passed);
+    makeUpBlows(passed);
   }
   contact_.drivePlanes(halves(2 * part + 2));
   resolveCollisions();
   bendWay();
-  if (works && (!held || anew)) {
-    left_.work -= force_.hookWork.end(bodies_, force_.hookForces());
+  if (works) {
+    left_.friction += contact_.torqueWork(bodies_, Scalar(contact_dt_ / Scalar(2)));
+    force_.hookWork.endPart(bodies_, contact_dt_);
+    if (!held || anew) {
+      left_.work -= force_.hookWork.end(bodies_, force_.hookForces());
+    }
   }
   contact_.endPart(start, last);
   forcesValid_ = true;
