@@ -8,6 +8,7 @@
 #include <gravel/contact/impulse_list.hpp>
 #include <gravel/contact/problem_bodies.hpp>
 #include <gravel/contact/resting_gap.hpp>
+#include <gravel/contact/row_before.hpp>
 #include <gravel/contact/row_lanes.hpp>
 #include <gravel/contact/turning_lanes.hpp>
 
@@ -45,8 +46,9 @@ class ContactProblem : public detail::ProblemBodies<S> {
   std::vector<detail::RowMark> marks;   ///< by row
   std::vector<Vector3<S>> slipTargets;  ///< slip after a blow that sticks, by row; empty if zero for all
   std::vector<detail::TurningRow<S>> turning;  ///< by row; empty if nothing resists rolling or spinning
-  std::vector<detail::RowBefore<S>> earlier;   ///< by row; empty if zero for all
+  detail::RowsBefore<S> earlier;               ///< of rows that last; of all others zero
   bool drifting = false;                       ///< any contact whose second side drifts
+  bool looksBack = false;                      ///< any row may last
   bool grips = false;                          ///< any contact with more friction at rest than in a slide
   bool atOnce = false;       ///< rows slide as soon as friction is cut: there is no time to ask
   bool active = false;       ///< any contact that approaches faster than it may, or is held by friction
@@ -114,19 +116,13 @@ class ContactProblem : public detail::ProblemBodies<S> {
               const ContactKinds& kinds);
 
   /// Rows with their impulses. \param all  none of them was passed over
-  [[gnu::always_inline]] inline Lanes load(const Group& group, bool all) const {
-    Lanes row = Lanes::load(rows, group);
-    detail::ImpulseList<S>::load(
-        group, row, !turning.empty(), [&](std::size_t k) -> const auto& {
-          return all || marks[k].taken ? *impulses_ : *last_;
-        });
-    return row;
-  }
+  [[gnu::always_inline]] inline Lanes load(const Group& group, bool all) const;
   [[gnu::always_inline]] inline void storeImpulses(const Group& group, const Lanes& row);
 
   /// The square of the change that a sweep would make in velocities, at most; no bound, where it is still to
   /// be asked who slides.
-  [[gnu::always_inline]] inline Pack wrongAt(const Group& group, const Lanes& present) const;
+  [[gnu::always_inline]] inline Pack wrongAt(const Group& group, const Lanes& present,
+                                             const detail::RowSlides<S>& sliding) const;
 
   /// Makes these rows right while all others stand. The normal impulse leaves the slip as it is, so that both
   /// are found from the same velocities.
@@ -134,6 +130,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
   [[gnu::always_inline]] inline detail::RowChanges<S> change(const Group& group, Lanes& row,
                                                              const detail::BodyLanes<S>& b1,
                                                              const detail::BodyLanes<S>& b2,
+                                                             const detail::RowSlides<S>& sliding,
                                                              Turned& turned) const;
   /// The same for the normal impulse that they have.
   [[gnu::always_inline]] inline Turned rub(const Group& group, Lanes& row, const detail::BodyLanes<S>& b1,
@@ -146,8 +143,12 @@ class ContactProblem : public detail::ProblemBodies<S> {
   [[gnu::always_inline]] inline detail::PackedVector<S> slipOf(const Group& group,
                                                                const detail::PackedVector<S>& slip) const;
   /// Where static and kinetic friction are one, it does not matter who slides.
-  [[gnu::always_inline]] inline detail::RowSlides<S> slidesOf(const Group& group) const;
-  [[gnu::always_inline]] inline void lookBackAt(const Group& group, detail::RowSlides<S>& slides) const;
+  /// \param before  `before.of(k)` of a row that lasts
+  template <class Before>
+  [[gnu::always_inline]] inline detail::RowSlides<S> slidesOf(const Group& group, Before& before) const;
+  template <class Before>
+  [[gnu::always_inline]] inline void lookBackAt(const Group& group, Before& before,
+                                                detail::RowSlides<S>& slides) const;
 
   /// Sweeps went on with static friction where it was not known who slides: those whose friction is at its
   /// limit, and whose slip exceeds `least`, do, and are to be looked at again. \return whether there are any
@@ -180,13 +181,14 @@ class ContactProblem : public detail::ProblemBodies<S> {
   };
 
   using Most = detail::RowNeeds<S>;
+  using Taken = detail::RowsTaken<S>;
   /// Whether what a row asks for left its restitution and its turn out of account, and whether it did so as
   /// one that carried a load before.
   enum class RowRest : std::uint8_t { Not, Free, Loaded };
 
-  /// Takes up those rows but the lone ones of which `wanted(k, most)`, without a guess: their bodies have it.
+  /// Takes up those rows but the lone ones of which `wanted(k, sum)`, without a guess: their bodies have it.
   template <class B, class Wanted>
-  Most lookAtRows(const Taking<B>& taking, Wanted&& wanted);
+  Taken lookAtRows(const Taking<B>& taking, Wanted&& wanted);
 
   /// By lane.
   template <class Of>
@@ -205,13 +207,13 @@ class ContactProblem : public detail::ProblemBodies<S> {
 
   /// Takes up rows without an impulse.
   template <class B>
-  [[gnu::always_inline]] inline Lanes take(const Taking<B>& taking, const Group& group, Most& most);
+  [[gnu::always_inline]] inline Lanes take(const Taking<B>& taking, const Group& group, Taken& sum);
 
   /// And with the last one once more, which their bodies have already, or with one that these get.
   template <class B>
-  [[gnu::flatten]] void takeAgain(const Taking<B>& taking, const Group& group, Most& most);
+  [[gnu::flatten]] void takeAgain(const Taking<B>& taking, const Group& group, Taken& sum);
   template <class B>
-  [[gnu::flatten]] void takeWithGuess(const Taking<B>& taking, const Group& group, Most& most);
+  [[gnu::flatten]] void takeWithGuess(const Taking<B>& taking, const Group& group, Taken& sum);
 
   /// All rows but the lone ones after a restart, with the targets they have.
   template <class B>
@@ -236,7 +238,8 @@ class ContactProblem : public detail::ProblemBodies<S> {
   /// \return the largest change of a normal velocity
   template <class B>
   [[gnu::always_inline]] inline S aim(const Taking<B>& taking, const Group& group, Lanes& row,
-                                      const detail::BodyLanes<S>& b1, const detail::BodyLanes<S>& b2);
+                                      const detail::BodyLanes<S>& b1, const detail::BodyLanes<S>& b2,
+                                      Taken& sum);
 
   /// Half of what the bend of their ways does to the velocities of pairs until the end of the step.
   template <class B>
@@ -268,7 +271,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
   template <class B>
   void lookBack(const Taking<B>& taking, const Group& group, const Lanes& row, const detail::BodyLanes<S>& b1,
                 const detail::BodyLanes<S>& b2, const Pack& v_n, const Pack& load,
-                const detail::PackedVector<S>& aimed);
+                const detail::PackedVector<S>& aimed, Taken& sum);
 
   /// Target of a row that may be faster than what rests.
   template <class B>
@@ -296,10 +299,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
   S heldAcross(const ContactColoring& colouring, std::size_t k, const S& approach) const;
 
   /// Rows that were taken up, and their impulses.
-  [[gnu::always_inline]] inline void put(const Group& group, const Lanes& row) {
-    row.store(rows, group);
-    impulses_->store(group, row);
-  }
+  [[gnu::always_inline]] inline void put(const Group& group, const Lanes& row);
 
   std::vector<S> gaps_;                           ///< [m] by row
   std::vector<RowRest> rests_;                    ///< by row

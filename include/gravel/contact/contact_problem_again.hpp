@@ -31,9 +31,9 @@ void ContactProblem<S>::recall(const ContactColoring& colouring) {
 
 template <Real S>
 template <class B, class Wanted>
-auto ContactProblem<S>::lookAtRows(const Taking<B>& taking, Wanted&& wanted) -> Most {
+auto ContactProblem<S>::lookAtRows(const Taking<B>& taking, Wanted&& wanted) -> Taken {
   const ContactColoring& colouring = taking.colouring;
-  return detail::sumOverAllParts(colouring, Most{}, [&](std::size_t begin, std::size_t end, Most& part) {
+  return detail::sumOverAllParts(colouring, Taken{}, [&](std::size_t begin, std::size_t end, Taken& part) {
     if (begin < colouring.loneCount()) {
       return;
     }
@@ -45,15 +45,15 @@ auto ContactProblem<S>::lookAtRows(const Taking<B>& taking, Wanted&& wanted) -> 
 
 template <Real S>
 template <class B>
-void ContactProblem<S>::takeAgain(const Taking<B>& taking, const Group& group, Most& most) {
-  Lanes row = take(taking, group, most);
+void ContactProblem<S>::takeAgain(const Taking<B>& taking, const Group& group, Taken& sum) {
+  Lanes row = take(taking, group, sum);
   recallSlides(group, row);
   takeGuess(group, row, detail::BodyLanes<S>::load(bodies, group.slot1),
             detail::BodyLanes<S>::load(bodies, group.slot2));
   put(group, row);
-  const Pack wrong = wrongAt(group, row);
+  const Pack wrong = wrongAt(group, row, slidesOf(group, sum));
   if (taking.colouring.isOfLarge(group.row[0])) {
-    most += Most{S(0), wrong.largest(), group.count};
+    sum.needs += Most{S(0), wrong.largest(), group.count};
     return;
   }
   for (std::size_t lane = 0; lane < group.count; ++lane) {

@@ -16,6 +16,16 @@
 namespace gravel {
 
 template <Real S>
+inline auto ContactProblem<S>::load(const Group& group, bool all) const -> Lanes {
+  Lanes row = Lanes::load(rows, group);
+  detail::ImpulseList<S>::load(
+      group, row, !turning.empty(), [&](std::size_t k) -> const auto& {
+        return all || marks[k].taken ? *impulses_ : *last_;
+      });
+  return row;
+}
+
+template <Real S>
 inline void ContactProblem<S>::storeImpulses(const Group& group, const Lanes& row) {
   impulses_->store(group, row);
   for (std::size_t lane = 0; lane < group.count; ++lane) {
@@ -32,10 +42,11 @@ inline auto ContactProblem<S>::slipOf(const Group& group, const detail::PackedVe
 }
 
 template <Real S>
-inline detail::RowSlides<S> ContactProblem<S>::slidesOf(const Group& group) const {
+template <class Before>
+inline detail::RowSlides<S> ContactProblem<S>::slidesOf(const Group& group, Before& before) const {
   const Pack zero = Pack::zero();
   detail::RowSlides<S> slides{zero > zero, zero > zero, Pack::all(this->mostLoad_)};
-  lookBackAt(group, slides);
+  lookBackAt(group, before, slides);
   if (grips) {
     const auto of = [&](auto&& is) {
       return Pack::of([&](std::size_t lane) { return S(is(marks[group.row[lane]]) ? 1 : 0); }) > zero;
@@ -47,31 +58,32 @@ inline detail::RowSlides<S> ContactProblem<S>::slidesOf(const Group& group) cons
 }
 
 template <Real S>
-inline auto ContactProblem<S>::wrongAt(const Group& group, const Lanes& present) const -> Pack {
+inline auto ContactProblem<S>::wrongAt(const Group& group, const Lanes& present,
+                                       const detail::RowSlides<S>& sliding) const -> Pack {
   Lanes row = present;
   const auto b1 = detail::BodyLanes<S>::load(bodies, group.slot1);
   const auto b2 = detail::BodyLanes<S>::load(bodies, group.slot2);
   Turned turned;
-  const auto changes = change(group, row, b1, b2, turned);
+  const auto changes = change(group, row, b1, b2, sliding, turned);
   const Pack wrong = largerOf(changes.change_sq(), turned.d_rho.squaredNorm());
   if (!grips) {
     return wrong;
   }
-  const auto open = changes.slides & !slidesOf(group).kinetic & (row.stick > row.slide);
+  const auto open = changes.slides & !sliding.kinetic & (row.stick > row.slide);
   return choose(open, Pack::all(Eigen::NumTraits<S>::highest()), wrong);
 }
 
 template <Real S>
 inline auto ContactProblem<S>::change(const Group& group, Lanes& row, const detail::BodyLanes<S>& b1,
-                                      const detail::BodyLanes<S>& b2, Turned& turned) const
-    -> detail::RowChanges<S> {
+                                      const detail::BodyLanes<S>& b2, const detail::RowSlides<S>& sliding,
+                                      Turned& turned) const -> detail::RowChanges<S> {
   detail::RowChanges<S> changes;
   const detail::PackedVector<S> v_rel = b2.v - b1.v;
   const Pack v_n = row.n.dot(v_rel);
   pushRight(row, b1, b2, v_n, changes);
   changes.rubs = changes.slides = Pack::zero() > Pack::zero();
   if (friction) {
-    turned = rub(group, row, b1, b2, slipVelocity(row, v_rel, v_n, b1, b2), slidesOf(group), changes);
+    turned = rub(group, row, b1, b2, slipVelocity(row, v_rel, v_n, b1, b2), sliding, changes);
   }
   return changes;
 }

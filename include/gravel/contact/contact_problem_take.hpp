@@ -39,8 +39,7 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   // A slip is at most of four speeds and spins of three components.
   const S fall = speedIn(S(this->leastFall_ * dt));
   const bool lasts = drifting || S(7) * this->fastest_ > detail::RowBefore<S>::lasting() * fall;
-  const bool looksBack = friction && way.kick > S(0) && lasts;
-  earlier.assign(looksBack ? rows.size() : 0, {});
+  looksBack = friction && way.kick > S(0) && lasts;
   detail::resizeSparingly(rests_, contacts.size());
   detail::resizeSparingly(approaches_, contacts.size());
   detail::resizeSparingly(wrongs_, again ? colouring.islandsEnd() : 0);
@@ -49,8 +48,8 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
            (turning.empty() || last.turns());
   threshold_ = settings.restitutionThreshold;
   const Taking<B> taking{contacts, source, colouring, dt, settings, fresh, way};
-  Most most = detail::sumOverParts(
-      0, colouring.loneCount(), Most{}, [&](std::size_t begin, std::size_t end, Most& part) {
+  Taken sum = detail::sumOverParts(
+      0, colouring.loneCount(), Taken{}, [&](std::size_t begin, std::size_t end, Taken& part) {
         forGroups(colouring, begin, end, [&](const Group& group) { put(group, take(taking, group, part)); });
         if (again) {  // lone rows are solved without a guess
           release(colouring, begin, end);
@@ -60,22 +59,24 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
     if (fresh) {
       fillAll(taking);
     }
-    Most all = most;
-    all += lookAtRows(taking, [&](std::size_t k, Most& part) {
+    Taken all = sum;
+    all += lookAtRows(taking, [&](std::size_t k, Taken& part) {
       if (colouring.isOfLarge(k) && isPassed(k, colouring)) {
-        part += Most{approaches_[k], S(0), 0, approaches_[k]};
-        marks[k].taken = false;
+        part.needs += Most{approaches_[k], S(0), 0, approaches_[k]};
+        marks[k].taken = marks[k].lasts = false;
         return false;
       }
       watch.enterFirst(k, false);
       return true;
     });
     // They were right to what was enough then: twice what the watch lets pass.
-    passes = !(settings.tolerance * all.approach < S(1.8) * watch.still());
-    most = passes ? all : most;
+    passes = !(settings.tolerance * all.needs.approach < S(1.8) * watch.still());
+    if (passes) {
+      sum = std::move(all);
+    }
   }
   if (again && !passes) {
-    most += lookAtRows(taking, [&](std::size_t k, Most&) {
+    sum += lookAtRows(taking, [&](std::size_t k, Taken&) {
       if (k % Group::width == 0) {
         fetch(taking, k + lookAhead);
         fetch(colouring, k + lookAhead);
@@ -83,14 +84,17 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
       return true;
     });
   } else if (!again) {
-    most +=
-        detail::sumOverColourParts(colouring, Most{}, [&](std::size_t begin, std::size_t end, Most& part) {
+    sum +=
+        detail::sumOverColourParts(colouring, Taken{}, [&](std::size_t begin, std::size_t end, Taken& part) {
           forGroups(colouring, begin, end, [&](const Group& group) {
             fetch(taking, group.row[0] + lookAhead);
             takeWithGuess(taking, group, part);
           });
         });
   }
+  earlier.set(rows.size(), std::move(sum.before));
+  looksBack = !earlier.empty();
+  const Most& most = sum.needs;
   largestApproach = std::max<S>(most.approach, heldAcross(colouring, colouring.islandsEnd(), most.approach));
   wrong_sq = most.wrong_sq;
   looks = most.looks;
@@ -115,15 +119,15 @@ inline void ContactProblem<S>::fetch(const Taking<B>& taking, std::size_t k) con
 
 template <Real S>
 template <class B>
-inline auto ContactProblem<S>::take(const Taking<B>& taking, const Group& group, Most& most) -> Lanes {
+inline auto ContactProblem<S>::take(const Taking<B>& taking, const Group& group, Taken& sum) -> Lanes {
   const auto b1 = detail::BodyLanes<S>::load(initial, group.slot1);
   const auto b2 = detail::BodyLanes<S>::load(initial, group.slot2);
   Lanes row = taking.fresh ? rowsOf(taking, group, b1.spin, b2.spin) : Lanes::load(rows, group);
   if (taking.fresh && !turning.empty()) {
     fillTurning(taking, group, b1.spin, b2.spin);
   }
-  const S any = aim(taking, group, row, b1, b2);
-  most += Most{taking.colouring.isOfLarge(group.row[0]) ? any : S(0), S(0), 0, any};
+  const S any = aim(taking, group, row, b1, b2, sum);
+  sum.needs += Most{taking.colouring.isOfLarge(group.row[0]) ? any : S(0), S(0), 0, any};
   return row;
 }
 
@@ -166,7 +170,7 @@ void ContactProblem<S>::fillTurning(const Taking<B>& taking, const Group& group,
 template <Real S>
 template <class B>
 inline S ContactProblem<S>::aim(const Taking<B>& taking, const Group& group, Lanes& row,
-                                const detail::BodyLanes<S>& b1, const detail::BodyLanes<S>& b2) {
+                                const detail::BodyLanes<S>& b1, const detail::BodyLanes<S>& b2, Taken& sum) {
   const Pack zero = Pack::zero();
   const Pack falls = b1.inverseMass + b2.inverseMass;
   const Pack gap = Pack::of([&](std::size_t lane) { return gaps_[group.row[lane]]; });
@@ -216,8 +220,8 @@ inline S ContactProblem<S>::aim(const Taking<B>& taking, const Group& group, Lan
   for (std::size_t lane = 0; lane < group.count && slips; ++lane) {  // of the others they are zero
     aimSlip(taking, group, lane, row, drift[lane], slip.at(lane));
   }
-  if (!earlier.empty()) {
-    lookBack(taking, group, row, b1, b2, present, load, slip);
+  if (looksBack) {
+    lookBack(taking, group, row, b1, b2, present, load, slip, sum);
   }
   const Pack approach = row.target - present;
   S most(0);
@@ -260,6 +264,12 @@ S ContactProblem<S>::rebound(const Taking<B>& taking, const Group& group, std::s
 }
 
 template <Real S>
+inline void ContactProblem<S>::put(const Group& group, const Lanes& row) {
+  row.store(rows, group);
+  impulses_->store(group, row);
+}
+
+template <Real S>
 inline void ContactProblem<S>::takeGuess(const Group& group, Lanes& row, const detail::BodyLanes<S>& b1,
                                          const detail::BodyLanes<S>& b2) const {
   using Quad = detail::PackedQuad<S>;
@@ -288,8 +298,8 @@ inline void ContactProblem<S>::takeGuess(const Group& group, Lanes& row, const d
 
 template <Real S>
 template <class B>
-void ContactProblem<S>::takeWithGuess(const Taking<B>& taking, const Group& group, Most& most) {
-  Lanes row = take(taking, group, most);
+void ContactProblem<S>::takeWithGuess(const Taking<B>& taking, const Group& group, Taken& sum) {
+  Lanes row = take(taking, group, sum);
   recallSlides(group, row);
   auto b1 = detail::BodyLanes<S>::load(bodies, group.slot1);
   auto b2 = detail::BodyLanes<S>::load(bodies, group.slot2);

@@ -91,14 +91,17 @@ inline auto ContactProblem<S>::turningOf(const Taking<B>& taking, const Group& g
 }
 
 template <Real S>
-inline void ContactProblem<S>::lookBackAt(const Group& group, detail::RowSlides<S>& slides) const {
-  bool any = false;
-  for (std::size_t lane = 0; lane < group.count && !earlier.empty(); ++lane) {
-    any = any || marks[group.row[lane]].lasts;
-  }
-  if (any) {
-    slides.slipBefore = vectorsOf([&](std::size_t lane) { return earlier[group.row[lane]].slip; });
-    slides.turnBefore = vectorsOf([&](std::size_t lane) { return earlier[group.row[lane]].turn; });
+template <class Before>
+inline void ContactProblem<S>::lookBackAt(const Group& group, Before& before,
+                                          detail::RowSlides<S>& slides) const {
+  const auto lasts = [&](std::uint32_t k) { return marks[k].lasts; };
+  if (looksBack && std::any_of(group.row.begin(), group.row.end(), lasts)) {
+    const auto of = [&](std::size_t lane, auto part) {
+      const std::uint32_t k = group.row[lane];
+      return lasts(k) ? before.of(k).*part : Vector3<S>(Vector3<S>::Zero());
+    };
+    slides.slipBefore = vectorsOf([&](std::size_t lane) { return of(lane, &detail::RowBefore<S>::slip); });
+    slides.turnBefore = vectorsOf([&](std::size_t lane) { return of(lane, &detail::RowBefore<S>::turn); });
   }
 }
 
@@ -106,7 +109,8 @@ template <Real S>
 template <class B>
 void ContactProblem<S>::lookBack(const Taking<B>& taking, const Group& group, const Lanes& row,
                                  const detail::BodyLanes<S>& b1, const detail::BodyLanes<S>& b2,
-                                 const Pack& v_n, const Pack& load, const detail::PackedVector<S>& aimed) {
+                                 const Pack& v_n, const Pack& load, const detail::PackedVector<S>& aimed,
+                                 Taken& sum) {
   const Pack zero = Pack::zero();
   const Pack falls = speedIn((b1.inverseMass + b2.inverseMass) * Pack::all(taking.dt));
   const auto m1 = detail::BodyLanes<S>::load(bodies, group.slot1);
@@ -115,6 +119,14 @@ void ContactProblem<S>::lookBack(const Taking<B>& taking, const Group& group, co
   const auto lasts = [&](const detail::PackedVector<S>& v, const Pack& stop) {
     const Pack least = Pack::all(detail::RowBefore<S>::lasting()) * largerOf(falls, stop);
     return (load > zero) & (v.squaredNorm() > least * least);
+  };
+  const auto takeDown = [&](std::uint32_t k) -> detail::RowBefore<S>& {
+    if (!marks[k].lasts) {
+      sum.before.push_back({k});
+    }
+    rests_[k] = RowRest::Not;
+    marks[k].lasts = true;
+    return sum.of(k);
   };
   const auto slip = slipOf(group, slipVelocity(row, b2.v - b1.v, v_n, b1, b2)) + aimed;
   const auto slides = lasts(slip, row.stick * push * tangentialMobility(row, m1, m2));
@@ -127,9 +139,7 @@ void ContactProblem<S>::lookBack(const Taking<B>& taking, const Group& group, co
       const Vector3<S> n = row.n.at(lane);
       const Vector3<S> kick =
           speedIn(Vector3<S>(taking.way.kick * (a(group.slot2[lane]) - a(group.slot1[lane]))));
-      earlier[k].slip = slip.at(lane) + aimed.at(lane) - (kick - n.dot(kick) * n);
-      rests_[k] = RowRest::Not;
-      marks[k].lasts = true;
+      takeDown(k).slip = slip.at(lane) + aimed.at(lane) - (kick - n.dot(kick) * n);
     }
   }
   if (turning.empty()) {
@@ -143,9 +153,7 @@ void ContactProblem<S>::lookBack(const Taking<B>& taking, const Group& group, co
   for (std::size_t lane = 0; rolls.any() && lane < group.count; ++lane) {
     const std::uint32_t k = group.row[lane];
     if (rolls[lane] && !marks[k].impact) {
-      earlier[k].turn = turn.at(lane);
-      rests_[k] = RowRest::Not;
-      marks[k].lasts = true;
+      takeDown(k).turn = turn.at(lane);
     }
   }
 }

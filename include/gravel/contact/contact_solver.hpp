@@ -118,7 +118,7 @@ class ContactSolver {
         goesOn_ = true;
       }
       detail::giveBack(problem_.slipTargets);
-      detail::giveBack(problem_.earlier);
+      problem_.earlier.forget();
     }
     if (!goesOn_) {
       rowImpulses_.clear(contacts.size());

@@ -41,7 +41,8 @@ struct RowImpulses {
       row.l = row.l + step.l;
     }
     TurningChanges<S> turned;
-    const RowChanges<S> changes = problem.change(group, row, b1, b2, turned);
+    const RowChanges<S> changes =
+        problem.change(group, row, b1, b2, problem.slidesOf(group, problem.earlier), turned);
     push(b1, b2, changes.dj * row.n + changes.dt);
     if (problem.friction) {
       if (problem.grips) {
@@ -105,7 +106,7 @@ struct RowImpulses {
     const typename Packed<S>::Truth no = Packed<S>::zero() > Packed<S>::zero();
     const bool tired = problem.marks[k].slides >= RowMark::patience;
     RowSlides<S> sliding{!no, tired ? !no : no};
-    problem.lookBackAt(group, sliding);
+    problem.lookBackAt(group, problem.earlier, sliding);
     const auto turned =
         problem.rub(group, row, b1, b2, slipVelocity(row, v_rel, row.n.dot(v_rel), b1, b2), sliding, changes);
     push(b1, b2, changes.dt);

@@ -119,15 +119,6 @@ struct RowMark {
   static constexpr std::uint8_t patience = 8;
 };
 
-/// How a row slipped and turned across n before the kick, if that lasts: if it is more than so many times
-/// what a step does to it.
-template <Real S>
-struct RowBefore {
-  Vector3<S> slip = Vector3<S>::Zero();
-  Vector3<S> turn = Vector3<S>::Zero();
-  static S lasting() { return S(2); }
-};
-
 /// What rows ask for.
 template <Real S>
 struct RowNeeds {

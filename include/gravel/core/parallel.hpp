@@ -239,7 +239,7 @@ T orderedSum(std::size_t n, std::size_t chunk, const T& zero, F&& f) {
       parts[c] += parts[c + width];
     }
   }
-  return parts[0];
+  return std::move(parts[0]);
 }
 
 /// The least of `start` and f(i) for i = 0 … n-1, in chunks.
