@@ -53,6 +53,9 @@ class BoundaryContacts {
   void forget() {
     giveBack(contacts_);
     parts_.resize(std::min<std::size_t>(parts_.size(), 1));
+    for (Part& part : parts_) {
+      giveBack(part.contacts);
+    }
   }
 
   /// Sorted by keys.

@@ -53,6 +53,7 @@ class ContactColoring {
     islands_.bundle(std::span<const Row>(byContact_), degree_, maxColours);
     choose();
     arrange();
+    islands_.forgetNumbers();
     detail::giveBack(byContact_);
     detail::giveBack(degree_);
     detail::giveBack(group_);
@@ -137,6 +138,7 @@ class ContactColoring {
     }
     slotOfBody_.resize(std::max(slotOfBody_.size(), bodies.size()), none);
     bodyOfSlot_.clear();
+    bodyOfSlot_.reserve(bodies.size());
     const auto take = [&](std::uint32_t body) {
       if (slotOfBody_[body] == none) {
         slotOfBody_[body] = 0;
@@ -157,6 +159,7 @@ class ContactColoring {
     std::sort(bodyOfSlot_.begin() + firsts, bodyOfSlot_.end(), before);
     std::inplace_merge(bodyOfSlot_.begin(), bodyOfSlot_.begin() + firsts, bodyOfSlot_.end(), before);
     movable_.clear();
+    movable_.reserve(staticSlot() + 1);
     for (std::uint32_t slot = 0; slot < staticSlot(); ++slot) {
       slotOfBody_[bodyOfSlot_[slot]] = slot;
       movable_.push_back(detail::isMovable(bodies, bodyOfSlot_[slot]) ? 1 : 0);

@@ -38,9 +38,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
   using Base::late_;
   using Base::leans_;
   using Base::letGo;
-  using Base::linked_;
   using Base::merges_;
-  using Base::pairsOf_;
   using Base::predictAgain;
   using Base::predictAll;
   using Base::queue_;
@@ -74,6 +72,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
                           Course&& course = {}, const Decide& decide = {}, const Support& support = {}) {
     using Path = std::remove_reference_t<Course>;
     clear();
+    this->cleared_ = false;
     const detail::ImpactScene<S, B, Path, Support> scene{bodies,   domain, materials, walls,      held,
                                                          settings, course, support,   &histories_};
     predictAll(scene, near.pairs(), nearWalls);
@@ -81,10 +80,9 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     if (!queue_.empty()) {
       Base::prepare(bodies.size(), near.pairs().size(), held);
       flights_.forget(bodies.size());
-      if (linked_ != near.version() || near.version() == 0 || pairsOf_.bodies() != bodies.size()) {
-        pairsOf_.find(bodies.size(), near.pairs());
-        linked_ = near.version();
-      }
+      Base::link(bodies.size(), near);
+    } else {
+      Base::unlink();
     }
     S now(0);
     const auto goOn = [&](std::initializer_list<std::uint32_t> struck) {
@@ -127,15 +125,17 @@ class ImpactEvents : private detail::ImpactCourses<S> {
         goOn({event.first});
       }
     }
-    swept_.forget();
+    Base::end();
     report.impacts = impacts_.size();
     return report;
   }
 
   void clear() {
-    Base::forget();
-    detail::clearSpare(turns_);
-    late_.clear();
+    if (!std::exchange(this->cleared_, true)) {  // by the second time it would seem that nothing was filled
+      Base::forget();
+      detail::clearSpare(turns_);
+      late_.clear();
+    }
   }
 
   /// Pairs of ids that shall merge, in the order of the impacts of the last call.

@@ -43,6 +43,12 @@ class ImpactFlights {
   /// A new step of so many bodies. O(N).
   void forget(std::size_t count) {
     place_.assign(count, none);
+    flights_.clear();
+  }
+
+  /// They are of no use any more.
+  void end() {
+    giveBack(place_);
     clearSpare(flights_);
   }
 

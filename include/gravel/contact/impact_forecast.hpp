@@ -94,6 +94,21 @@ class ImpactForecast : protected ImpactPast<S> {
     std::make_heap(queue_.begin(), queue_.end(), after);
   }
 
+  /// Before blows: whose the pairs are that may meet.
+  template <class Near>
+  void link(std::size_t bodies, const Near& near) {
+    if (linked_ != near.version() || near.version() == 0 || pairsOf_.bodies() != bodies) {
+      pairsOf_.find(bodies, near.pairs());
+      linked_ = near.version();
+    }
+  }
+  void unlink() { pairsOf_.forget(); }
+  void end() {
+    swept_.forget();
+    flights_.end();
+    Base::end();
+  }
+
   template <class Scene>
   [[gnu::flatten]] void predictPairs(const Scene& scene, std::span<const Pair> pairs,
                                      std::vector<Event>& out) const {

@@ -27,8 +27,16 @@ class ImpactPast {
     struck_.clear();
     islandsKnown_ = false;
     clearSpare(impacts_);
-    earlier_.clear();
+    clearSpare(earlier_);
     merges_.clear();
+  }
+  /// All blows of the step are dealt: what nobody else looks at.
+  void end() {
+    giveBack(leans_);
+    giveBack(listed_);
+    giveBack(anchored_);
+    giveBack(struck_);
+    islands_ = {};
   }
 
   /// For the impacts of so many bodies, of which so many pairs may meet.
@@ -154,6 +162,7 @@ class ImpactPast {
     }
   }
 
+  bool cleared_ = false;  ///< since the last blow
   ImpactHistories<S> histories_;
   std::vector<unsigned char> leans_;     ///< bodies with a contact that is held
   std::vector<Listed> listed_;           ///< among what is held, by pair

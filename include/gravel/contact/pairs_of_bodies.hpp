@@ -39,6 +39,13 @@ class PairsOfBodies {
     }
   }
 
+  /// It is of no use any more.
+  void forget() {
+    release(first_);
+    release(start_);
+    release(asSecond_);
+  }
+
   /// Of the last list.
   std::size_t bodies() const { return first_.size(); }
 

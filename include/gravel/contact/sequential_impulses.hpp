@@ -60,6 +60,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
         colouring.bundles(), 1, detail::IslandReport<S>{}, [&](std::size_t bundle, std::size_t /*next*/) {
           return detail::IslandSweeps<S>(problem, colouring, bundle, settings, places_).solve();
         });
+    detail::giveBack(places_);
     if (colouring.islandsEnd() < problem.rows.size()) {
       sum += solveLarge(problem, colouring, settings);
     }

@@ -72,6 +72,9 @@ class SolverIslands {
     }
   }
 
+  /// numberOf() is of no use any more.
+  void forgetNumbers() { giveBack(numbers_); }
+
   /// The smallest slot in the island of a slot: slots are numbered by ids, the same whatever the indices.
   std::uint32_t of(std::uint32_t slot) const { return slots_.of(slot); }
   /// Of the slots, with the one of boundaries.

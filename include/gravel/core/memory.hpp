@@ -33,8 +33,8 @@ void resizeAnew(std::vector<T>& v, std::size_t n) {
   resizeSparingly(v, n);
 }
 
-/// Room for so many is kept where it is not needed.
-inline constexpr std::size_t fewEntries = 1024;
+/// [bytes] Room for that is kept where it is not needed.
+inline constexpr std::size_t littleMemory = std::size_t{1} << 14U;
 
 /// [bytes] From here on room is kept all the same: the allocator would give it back to the system, and to
 /// touch it anew in every part of every step costs more than the sweeps that it is for.
@@ -44,7 +44,7 @@ inline constexpr std::size_t muchMemory = std::size_t{1} << 20U;
 /// or much.
 template <class T>
 void giveBack(std::vector<T>& v) {
-  if (v.capacity() > fewEntries && v.capacity() < muchMemory / sizeof(T)) {
+  if (v.capacity() > littleMemory / sizeof(T) && v.capacity() < muchMemory / sizeof(T)) {
     release(v);
   }
 }
@@ -53,7 +53,7 @@ void giveBack(std::vector<T>& v) {
 /// blows by the thousand in a step, and none once it rests.
 template <class T>
 void clearSpare(std::vector<T>& v) {
-  if (v.capacity() > 4 * v.size() + fewEntries) {
+  if (v.capacity() > 4 * v.size() + littleMemory / sizeof(T)) {
     release(v);
   } else {
     v.clear();

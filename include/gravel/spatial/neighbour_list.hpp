@@ -126,7 +126,7 @@ class NeighbourList {
   template <class Positions, class Radii, class Travel>
   const char* whatIsStale(const Positions& positions, const Radii& radii, std::uint64_t revision,
                           const Domain<S>& domain, const S& time, const S& margin, const Travel& travel) {
-    swift_.clear();
+    detail::clearSpare(swift_);
     if (!built_) {
       return "first search";
     }
