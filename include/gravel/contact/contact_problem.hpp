@@ -182,9 +182,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
 
   using Most = detail::RowNeeds<S>;
   using Taken = detail::RowsTaken<S>;
-  /// Whether what a row asks for left its restitution and its turn out of account, and whether it did so as
-  /// one that carried a load before.
-  enum class RowRest : std::uint8_t { Not, Free, Loaded };
+  using RowRest = detail::RowRest;
 
   /// Takes up those rows but the lone ones of which `wanted(k, sum)`, without a guess: their bodies have it.
   template <class B, class Wanted>
@@ -302,7 +300,6 @@ class ContactProblem : public detail::ProblemBodies<S> {
   [[gnu::always_inline]] inline void put(const Group& group, const Lanes& row);
 
   std::vector<S> gaps_;                           ///< [m] by row
-  std::vector<RowRest> rests_;                    ///< by row
   std::vector<S> wrongs_;                         ///< by row of small islands
   std::vector<S> approaches_;                     ///< by row: change of the normal velocity that it asks for
   S threshold_ = S(0);                            ///< [m s^-1] of restitution, in the last problem

@@ -16,7 +16,8 @@ namespace gravel {
 template <Real S>
 bool ContactProblem<S>::isPassed(std::size_t k, const ContactColoring& colouring) const {
   const ContactColoring::Row& place = colouring.rows()[k];
-  return (rests_[k] == RowRest::Free || (rests_[k] == RowRest::Loaded && last_->normal(k) > S(0))) &&
+  const RowRest rest = marks[k].rest;
+  return (rest == RowRest::Free || (rest == RowRest::Loaded && last_->normal(k) > S(0))) &&
          !watch.isStale(k, place.slot1, place.slot2) && !(grips && slid(k, rows[k].slide));
 }
 
@@ -101,7 +102,7 @@ detail::SolvedProblem<S> ContactProblem<S>::solved(const ContactColoring& colour
   }
   for (std::size_t k = 0; k < rows.size() && watch.holds(); ++k) {
     const S then = k < colouring.islandsEnd() ? S(0) : watch.then()[k];  // those before are not watched
-    all.rows.push_back({then, approaches_[k], rows[k].target, S(static_cast<int>(rests_[k]))});
+    all.rows.push_back({then, approaches_[k], rows[k].target, S(static_cast<int>(marks[k].rest))});
   }
   all.still = watch.holds() ? watch.still() : S(0);
   all.threshold = threshold_;
@@ -125,16 +126,16 @@ void ContactProblem<S>::resume(const detail::SolvedProblem<S>& all, const B& sou
     ways[slot] = all.bodies[slot].way;
   }
   rows.resize(all.rows.size());
-  rests_.resize(all.rows.size());
+  marks.assign(all.rows.size(), detail::RowMark{});
   approaches_.resize(all.rows.size());
   std::vector<S> then(all.rows.size());
   for (std::size_t k = 0; k < all.rows.size(); ++k) {
     then[k] = all.rows[k].then;
     approaches_[k] = all.rows[k].approach;
     rows[k].target = all.rows[k].target;
-    rests_[k] = all.rows[k].rest == S(0)   ? RowRest::Not
-                : all.rows[k].rest == S(1) ? RowRest::Free
-                                           : RowRest::Loaded;
+    marks[k].rest = all.rows[k].rest == S(0)   ? RowRest::Not
+                    : all.rows[k].rest == S(1) ? RowRest::Free
+                                               : RowRest::Loaded;
   }
   watch.restore(all.still, std::move(ways), std::move(then));
   watch.setHolds(!all.rows.empty());

@@ -40,7 +40,6 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   const S fall = speedIn(S(this->leastFall_ * dt));
   const bool lasts = drifting || S(7) * this->fastest_ > detail::RowBefore<S>::lasting() * fall;
   looksBack = friction && way.kick > S(0) && lasts;
-  detail::resizeSparingly(rests_, contacts.size());
   detail::resizeSparingly(approaches_, contacts.size());
   detail::resizeSparingly(wrongs_, again ? colouring.islandsEnd() : 0);
   passes = again && watch.holds() && sameScales_ && ratio == S(1) && !kinds.spring && !drifting &&
@@ -205,8 +204,8 @@ inline S ContactProblem<S>::aim(const Taking<B>& taking, const Group& group, Lan
   row.target = (bends ? -allowed : smallerOf(zero, -allowed)) - drift;
   for (std::size_t lane = 0; lane < group.count; ++lane) {
     const std::uint32_t k = group.row[lane];
-    marks[k] = {.taken = true};
-    rests_[k] = turned.counts[lane] ? RowRest::Not : load[lane] > S(0) ? RowRest::Loaded : RowRest::Free;
+    const RowRest rest = load[lane] > S(0) ? RowRest::Loaded : RowRest::Free;
+    marks[k] = detail::RowMark{.taken = true, .rest = turned.counts[lane] ? RowRest::Not : rest};
   }
   if (fast.any()) {
     row.target = Pack::of([&](std::size_t lane) {
@@ -249,7 +248,9 @@ S ContactProblem<S>::rebound(const Taking<B>& taking, const Group& group, std::s
   const bool fast =
       speed > speedIn(S(taking.settings.restitutionThreshold + S(2) * change + pull * taking.dt));
   const bool impact = v_n < S(0) && fast && speed > allowed;
-  rests_[k] = fast ? RowRest::Not : rests_[k];
+  if (fast) {
+    marks[k].rest = RowRest::Not;
+  }
   marks[k].impact = impact;  // booked otherwise than what rests, by who integrates in time
   const bool parts = v_n > S(0) && fast;
   // Newton's law for every contact that gets an impulse (Moreau 1988): v_n^+ = -e v_n^-. One that parts and

@@ -124,7 +124,7 @@ void ContactProblem<S>::lookBack(const Taking<B>& taking, const Group& group, co
     if (!marks[k].lasts) {
       sum.before.push_back({k});
     }
-    rests_[k] = RowRest::Not;
+    marks[k].rest = RowRest::Not;
     marks[k].lasts = true;
     return sum.of(k);
   };

@@ -108,14 +108,19 @@ struct alignas(rowAlignment<S>) SolverRow {
   S slide;   ///< kinetic friction
 };
 
-/// What sweeps keep of a row besides.
+/// Whether what a row asks for left its restitution and its turn out of account, and whether it did so as
+/// one that carried a load before.
+enum class RowRest : std::uint8_t { Not, Free, Loaded };
+
+/// What sweeps keep of a row besides, in two bytes.
 struct RowMark {
-  bool impact = false;
-  bool taken = false;    ///< its impulse is in the list of this problem; if not, it is that of the last one
-  bool atLimit = false;  ///< its friction was cut when last looked at
-  bool kinetic = false;  ///< it slides: what cuts it is kinetic friction
-  bool lasts = false;    ///< it has a RowBefore
-  std::uint8_t slides = 0;  ///< how often it began to slide, `patience` at most: then it goes on
+  bool impact : 1 = false;
+  bool taken : 1 = false;    ///< its impulse is in the list of this problem; if not, in that of the last one
+  bool atLimit : 1 = false;  ///< its friction was cut when last looked at
+  bool kinetic : 1 = false;  ///< it slides: what cuts it is kinetic friction
+  bool lasts : 1 = false;    ///< it has a RowBefore
+  RowRest rest : 2 = RowRest::Not;
+  std::uint8_t slides : 4 = 0;  ///< how often it began to slide, `patience` at most: then it goes on
   static constexpr std::uint8_t patience = 8;
 };
 
