@@ -108,6 +108,8 @@ class ContactProblem : public detail::ProblemBodies<S> {
   void keepLast(const ContactColoring& colouring, detail::ImpulseList<S>& last);
   const detail::ImpulseList<S>& impulses() const { return *impulses_; }
   detail::ImpulseList<S>& impulses() { return *impulses_; }
+  /// It is solved: what the next one does not go on from is of no use any more.
+  void end();
   /// What the next problem, of the same contacts, goes on from.
   detail::SolvedProblem<S> solved(const ContactColoring& colouring) const;
   /// Puts it back. \param kinds of the contacts

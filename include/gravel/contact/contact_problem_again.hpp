@@ -92,6 +92,16 @@ void ContactProblem<S>::keepLast(const ContactColoring& colouring, detail::Impul
 }
 
 template <Real S>
+void ContactProblem<S>::end() {
+  detail::giveBack(slipTargets);
+  earlier.forget();
+  if (!watch.holds()) {  // the next one looks at all rows
+    watch.end();
+    detail::giveBack(approaches_);
+  }
+}
+
+template <Real S>
 detail::SolvedProblem<S> ContactProblem<S>::solved(const ContactColoring& colouring) const {
   detail::SolvedProblem<S> all;
   const int back = -speedExponent_;

@@ -117,8 +117,7 @@ class ContactSolver {
         problem_.scatter(bodies, coloring_);
         goesOn_ = true;
       }
-      detail::giveBack(problem_.slipTargets);
-      problem_.earlier.forget();
+      problem_.end();
     }
     if (!goesOn_) {
       rowImpulses_.clear(contacts.size());
