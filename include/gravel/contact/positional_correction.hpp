@@ -44,7 +44,10 @@ class PositionalCorrection {
     CorrectionReport<S> report;
     report.largestOverlap = facts.overlap;
     const S right = contacts.empty() ? S(0) : S(settings.precision * facts.radius);
-    if (!(facts.overlap > right)) {
+    if (!(facts.overlap > right)) {  // as in a heap at rest
+      detail::release(shifts_);
+      detail::release(deep_);
+      watch_ = {};
       return report;
     }
     takeUp(colouring, bodies);

@@ -91,6 +91,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     if (problem.again && !(problem.wrong_sq > right * right)) {
       problem.kept = problem.passes;
       problem.watch.setHolds(problem.passes);
+      momentum_.end();
       // One that would change nothing.
       return {1, problem.looks, S(sqrt(problem.wrong_sq) / problem.largestApproach)};
     }

@@ -6,6 +6,7 @@
 
 #include <gravel/contact/contact_problem.hpp>
 
+#include <utility>
 #include <vector>
 
 namespace gravel::detail {
@@ -47,11 +48,14 @@ class SweepMomentum {
     });
   }
 
-  /// They are of no use any more.
+  /// Sweeps are over. After some that went without, as in a heap at rest, no room is kept.
   void end() {
-    giveBack(steps_);
-    giveBack(turns_);
-    giveBack(swept_);
+    const auto leave = [begun = std::exchange(begun_, false)](auto& list) {
+      begun ? giveBack(list) : release(list);
+    };
+    leave(steps_);
+    leave(turns_);
+    leave(swept_);
   }
 
   /// Velocities follow the impulses beyond their last step, by this share: they are linear in the impulses.
@@ -93,6 +97,7 @@ class SweepMomentum {
   };
 
   void beginRows(const ContactProblem<S>& problem, std::size_t begin, std::size_t end) {
+    begun_ = true;
     first_ = begin;
     steps_.assign(end - begin, Quad{});
     turns_.assign(problem.turning.empty() ? 0 : end - begin, Quad{});
@@ -119,6 +124,7 @@ class SweepMomentum {
                [&](std::size_t lane) { return group.holds(lane); });
   }
 
+  bool begun_ = false;            ///< since the last end()
   std::size_t first_ = 0;         ///< row
   std::vector<BodySwept> swept_;  ///< by slot, or by place among those of begin()
   std::vector<Quad> steps_;       ///< by row
