@@ -24,7 +24,11 @@ void drive(Space<double>& space, const Scene& scene, double h) {
   }
   const double turns = scene.fieldTurn.norm();
   if (turns > 0.0) {  // that of the middle stands for the step
-    space.setUniformField(Eigen::AngleAxisd(turns * (time + 0.5 * h), scene.fieldTurn / turns) * scene.field);
+    const Eigen::AngleAxisd turn(turns * (time + 0.5 * h), scene.fieldTurn / turns);
+    const Vector3<double> field = turn * scene.field;
+    if (field != space.uniformField()) {  // as it is where the run has just begun
+      space.setUniformField(field);
+    }
   }
 }
 

@@ -231,6 +231,13 @@ class Schedule {
   double duration_, interval_;
 };
 
+/// How long the next step is in a run of equal steps: a millionth of one that would be left at the end is
+/// rounding in the sum of steps.
+double nextStep(const Space<double>& space, const Scene& scene) {
+  const double rest = scene.duration - space.time();
+  return rest > space.getTimeStep() * (1.0 + 1e-6) ? space.getTimeStep() : rest;
+}
+
 /// Makes one step, or what is left of one until the end, so that each can be looked at. Which one an adaptive
 /// run begins with, the space finds when it makes it: until then it says the longest that is allowed. That is
 /// kept within the run for this one step; all later ones may be as long as the scene says, in a run that goes
@@ -244,10 +251,9 @@ void stepTowards(Space<double>& space, const Scene& scene) {
   if (isLimited) {
     space.setTimeStep(rest);
   }
-  // A millionth of a step that would be left is rounding in the sum of steps.
-  const bool isWhole = isChosenLater || rest > space.getTimeStep() * (1.0 + 1e-6);
-  drive(space, scene, isWhole ? space.getTimeStep() : rest);
-  if (isWhole) {
+  const double h = nextStep(space, scene);
+  drive(space, scene, h);
+  if (isChosenLater || h < rest) {
     space.computeDynamics(space.steps());
   } else {
     space.advanceTo(scene.duration);
@@ -335,6 +341,8 @@ int run(const Options& options) {
   };
 
   onStopSignals(requestStop);
+  drive(space, scene,
+        nextStep(space, scene));  // what energies are measured against has the first step's field
   observe(false);
   bool isStop = false;
   while (space.time() < scene.duration && !isStop) {

@@ -33,14 +33,19 @@ bool areAlike(const Space<double>& a, const Space<double>& b, std::size_t i) {
          a.body(i).isFixed() == b.body(i).isFixed() && a.body(i).material() == b.body(i).material();
 }
 
-/// The same surfaces that move alike. The offset counts where nothing moves the plane along its normal: one
-/// that travels is elsewhere by now; and one that shakes has another velocity in each step.
+/// The same surfaces, where the scene's way has brought them; one that shakes has another velocity in each
+/// step.
 bool areAlike(const Space<double>& a, const Plane<double>& ofA, const Space<double>& b,
-              const Plane<double>& ofB, bool shakes) {
-  const bool travels = shakes || ofA.normal.dot(ofA.velocity) != 0.0;
-  return ofA.normal == ofB.normal && (shakes || ofA.velocity == ofB.velocity) &&
-         (travels || ofA.offset == ofB.offset) && ofA.material == ofB.material &&
-         a.material(ofA.material) == b.material(ofB.material);
+              const Plane<double>& ofB, const ScenePlane& plane) {
+  const double time = b.time();
+  Vector3<double> way = time * plane.velocity;
+  if (plane.shakes()) {
+    way += std::sin(2.0 * pi<double>() * time / plane.shakePeriod) * plane.shake;
+  }
+  const double size = std::abs(ofA.offset) + time * plane.velocity.norm() + plane.shake.norm();
+  return ofA.normal == ofB.normal && (plane.shakes() || ofA.velocity == ofB.velocity) &&
+         std::abs(ofA.offset + ofA.normal.dot(way) - ofB.offset) <= 1e-9 * size &&
+         ofA.material == ofB.material && a.material(ofA.material) == b.material(ofB.material);
 }
 
 /// Where bodies merge those that are left are some of the scene's, and have the mass of all.
@@ -87,14 +92,23 @@ std::string misfitOfSettings(const Scene&, const Space<double>& start, const Spa
   return {};
 }
 
+/// A field that turns keeps its size and its part along the axis.
+bool isOfField(const Scene& scene, const Vector3<double>& field) {
+  const Vector3<double>& start = scene.field;
+  const Vector3<double>& turn = scene.fieldTurn;
+  return turn == Vector3<double>::Zero()
+             ? field == start
+             : std::abs(field.norm() - start.norm()) <= 1e-9 * start.norm() &&
+                   std::abs(turn.dot(field - start)) <= 1e-9 * turn.norm() * start.norm();
+}
+
 std::string misfitOfSurroundings(const Scene& scene, const Space<double>& start, const Space<double>& saved) {
-  const bool turns = scene.fieldTurn != Vector3<double>::Zero();
-  if (!(saved.domain() == start.domain()) || (!turns && saved.uniformField() != start.uniformField()) ||
+  if (!(saved.domain() == start.domain()) || !isOfField(scene, saved.uniformField()) ||
       saved.planes().size() != start.planes().size()) {
     return "its domain, field or planes are not the scene's";
   }
   for (std::size_t k = 0; k < start.planes().size(); ++k) {
-    if (!areAlike(start, start.planes()[k], saved, saved.planes()[k], scene.planes[k].shakes())) {
+    if (!areAlike(start, start.planes()[k], saved, saved.planes()[k], scene.planes[k])) {
       return "normal, place, velocity or material of its plane " + std::to_string(k) + " is not the scene's";
     }
   }

@@ -82,7 +82,7 @@ void requireRoom(TableReader& reader, const char* key, bool isKnown, double radi
   }
 }
 
-void requireRest(TableReader& reader, const Body<double>& body) {
+void requireRest(TableReader& reader, const Body<double>& body, bool flow) {
   const auto require = [&](const char* key, const Vector3<double>& value) {
     if (body.fixed && value != Vector3<double>::Zero()) {
       reader.fault(key, detail::formatVector(value),
@@ -91,6 +91,9 @@ void requireRest(TableReader& reader, const Body<double>& body) {
   };
   require("velocity", body.velocity);
   require("angularVelocity", body.angularVelocity);
+  if (body.fixed && flow) {
+    reader.fault("flow", "true", "none on a \"fixed\" body, which never moves");
+  }
 }
 
 void readBody(TableReader& reader, const MaterialReader& materials, const Domain<double>& domain,
@@ -124,8 +127,8 @@ void readBody(TableReader& reader, const MaterialReader& materials, const Domain
     body.inertia = inertia;
   }
   reader.flag("fixed", body.fixed);
-  requireRest(reader, body);
   readLook(reader, materials, entry);
+  requireRest(reader, body, entry.flow);
   if (reader.isSound()) {
     try {
       validate(body, entry.name.empty() ? "body " + std::to_string(bodies.size()) : "\"" + entry.name + "\"");

@@ -65,6 +65,8 @@ simulation = {G = 0, timeStep = 0.1, adaptiveTimeStep = false}
 output.frames = 0
 body = [{mass = 1e200, velocity = [1e60, 0, 0]}]
 end
+sed 's/shake = .*, shakeP/shake = [0.01, 0, 0.03], shakeP/' "$2/driven.toml" >"$2/other_shake.toml"
+sed 's/-1], turn/-2], turn/' "$2/driven.toml" >"$2/other_turn.toml"
 sed 's/mass = 1}]/mass = 2}]/' "$2/driven.toml" >"$2/other_mass.toml"
 sed 's/normal = .*/normal = [0.1, 0, 1]/' "$2/ball.toml" >"$2/other_normal.toml"
 sed 's/friction = .*/friction = 0.25/' "$2/ball.toml" >"$2/other_surface.toml"
@@ -140,6 +142,8 @@ go driven driven_halves --restart "$folder/driven_half.gravel" || exit 1
 cmp "$folder/driven_whole.gravel" "$folder/driven_halves.gravel" || exit 1
 grep -q "^1 body of 3 merged" "$folder/driven_half/summary.txt" && grep -q "^2 bodies of 3 merged" \
   "$folder/driven_halves/summary.txt" || { echo "no two mergers, one before the restart and one after it"; exit 1; }
+refuses 2 "of its plane 0 is not the scene's" other_shake --restart "$folder/driven_half.gravel"
+refuses 2 "its domain, field or planes are not the scene's" other_turn --restart "$folder/driven_half.gravel"
 refuses 2 "its mass is 3, the scene's 4" other_mass --restart "$folder/driven_half.gravel"
 refuses 2 "is the state at time 2; allowed: one before the end, 2" grains --restart "$folder/whole.gravel"
 refuses 1 "^gravel-run: the snapshot .*grains.toml" grains --restart "$folder/grains.toml"

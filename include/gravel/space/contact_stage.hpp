@@ -149,6 +149,8 @@ class ContactStage {
   /// [J]
   template <class Change>
   Scalar makeUpBlows(Bodies& bodies, const Scalar& time, const Scalar& h, Change&& change);
+  /// Whether anything was struck in the step so far.
+  bool struck() const { return !impacts().empty() || !impacts_.impacts().empty(); }
   /// What the blows of the drift that is to come did to spins.
   std::span<const TurnChange<Scalar>> turns() const { return impacts_.turns(); }
   /// What the last solve() gave to the work that present torques did just before [J]: see bookKick().
@@ -233,7 +235,6 @@ class ContactStage {
   const std::vector<Impact<Scalar>>& impacts() const {
     return record_.hasParts() ? record_.impacts() : impacts_.impacts();
   }
-
   /// The same of the bodies that are there, where it is not the same: made when somebody looks, since bodies
   /// may be removed one by one.
   struct Present {

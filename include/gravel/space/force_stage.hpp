@@ -105,6 +105,14 @@ class ForceStage {
     }
   }
 
+  /// Of a hook that is gone.
+  static void clearTorques(Bodies<Scalar, Layout>& bodies) {
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      bodies[i].torque() = Vector3<Scalar>::Zero().eval();
+      bodies[i].angularAcceleration() = Vector3<Scalar>::Zero().eval();
+    }
+  }
+
   /// Mutual gravity, with that of images, and the field [J]. O(N^2) by the direct sum, O(N) by expansions,
   /// with their error.
   Scalar potentialEnergy(const Bodies<Scalar, Layout>& bodies, const Scalar& G, const Scalar& softening,

@@ -43,7 +43,7 @@ struct SimulationConfig {
   Scalar spinningFriction = Scalar(0);       ///< the same of spin about the normal
   Scalar linearDamping = Scalar(0);          ///< [s^-1] dv/dt = -c v
   Scalar angularDamping = Scalar(0);         ///< [s^-1] dw/dt = -c w
-  Scalar positionalCorrectionFactor = Scalar(0.4);  ///< share of each overlap removed per step
+  Scalar positionalCorrectionFactor = Scalar(0.4);  ///< share of each overlap removed in each part of a step
   Scalar contactTolerance = Scalar(1e-3);  ///< contact sweeps end when speeds change by less, relative
   std::size_t contactIterations = 0;       ///< most contact sweeps per solve, two a step; 0: limitSweeps()
   std::size_t contactSubsteps = 1;         ///< contact steps per force evaluation; 0: as motion asks

@@ -141,7 +141,12 @@ void Space<Scalar, Layout>::setUniformField(const Vector& g) {
   if (!isFinite(g)) {
     detail::refuse("uniform field", detail::formatVector(g), "finite");
   }
-  changePotential([&] { force_.field = g; });
+  if (ledgerOpen_) {  // what pulls each other is as it was
+    left_.exchange += fieldEnergy(bodies_, force_.field) - fieldEnergy(bodies_, g);
+  }
+  force_.field = g;
+  wakeAll();
+  forcesValid_ = false;
 }
 
 template <Real Scalar, class Layout>
@@ -155,9 +160,8 @@ void Space<Scalar, Layout>::setForceHook(ForceHook<Scalar, Layout> hook) {
   this->inStep_.refuse("setForceHook()");
   force_.hook = std::move(hook);
   wakeAll();
-  for (std::size_t i = 0; i < n() && !force_.hook; ++i) {
-    bodies_[i].torque() = Vector::Zero().eval();
-    bodies_[i].angularAcceleration() = Vector::Zero().eval();
+  if (!force_.hook) {
+    force_.clearTorques(bodies_);
   }
   forcesValid_ = false;
 }

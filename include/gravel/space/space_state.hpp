@@ -289,6 +289,9 @@ void Space<Scalar, Layout>::restore(const std::string& path) requires std::is_tr
   const bool complete = contact_.renumber(bodies_);
   rememberPlaces();
   forcesValid_ = numbers.stale == 0 && complete;  // else contacts are found anew
+  if (!force_.hook) {
+    force_.clearTorques(bodies_);
+  }
   if (numbers.stale == 0 && static_cast<bool>(force_.hook) == ofHook.empty() && n() > 0) {
     setForceHook(std::move(force_.hook));  // it works in place of that of the file, or of none there
   }

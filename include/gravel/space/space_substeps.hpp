@@ -172,7 +172,7 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
     force_.hookWork.depart(bodies_);
   }
   const auto bendWay = [&] {
-    if (works && !(contacts().empty() && impacts().empty())) {
+    if (works && (!contacts().empty() || contact_.struck())) {
       force_.hookWork.bend();
     }
   };
