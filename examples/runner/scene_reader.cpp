@@ -229,7 +229,7 @@ void readGas(TableReader& reader, const MaterialReader& materials, bool enclosed
   std::size_t count = 1000;
   double fraction = 0.1;
   reader.count("count", count, 1, mostBodies);
-  reader.real("fraction", fraction, {1e-9, 0.3, "0 to 0.3"});
+  reader.real("fraction", fraction, {1e-9, 0.3, "> 0, at most 0.3"});
   const std::uint64_t seed = readSeed(reader);
   requireRoom(reader, "radius", true, 0.5, domain);
   if (!enclosed) {

@@ -19,13 +19,13 @@ namespace gravel {
 /// become of the force, F_1 - F_0, and does (F_1 - F_0).v h/2 with v the velocity of the step's middle that
 /// the last drift leaves; so that the sum is
 ///     F_0.x + (F_1 - F_0).v h/2,
-/// but for (h^2/8m)(F_1^2 - F_0^2), which cancels from step to step. (F_0 + F_1).x/2, the same where nothing
-/// bounces, is off by one sign where a force turns with the velocity in a blow, as drag does: by (F_1 -
-/// F_0).(v after - v before) h/4.) Where velocities turn on the way, along an epicycle or an orbit, kicks do
-/// the mean power at both ends of each part; so does what comes near the integral of the power on smooth ways
-/// in several drifts, whose ends cancel. But that is off by F.(v after - v before) times a part of the step
-/// where something bounces: there the way counts. Of torques it is the mean power, and for a blow at t that
-/// gives the spin dw, torque.dw (h/2 - t) besides.
+/// but for (h^2/8m)(F_1^2 - F_0^2), which cancels from step to step. (The mean force times x is the same
+/// where nothing bounces, but where a force turns with the velocity in a blow, as drag does, it is off by
+/// (F_1 - F_0).(v after - v before) h/4, of one sign.) Where velocities turn on the way, along an epicycle or
+/// an orbit, kicks do the mean power at both ends of each part; so does what comes near the integral of the
+/// power on smooth ways in several drifts, whose ends cancel. But that is off by F.(v after - v before) times
+/// a part of the step where something bounces: there the way counts. Of torques it is the mean power, and for
+/// a blow at t that gives the spin dw, torque.dw (h/2 - t) besides.
 template <Real Scalar, class Layout>
 class HookWork {
  public:

@@ -202,7 +202,7 @@ class Space : public Settings<Scalar> {
   /// Blows that were dealt at their own time inside the last step, in their order; their times are those
   /// since its start.
   const std::vector<Impact<Scalar>>& impacts() const { return contact_.impacts(bodies_); }
-  /// Bodies that touch each body in the last step, by index: each once, in increasing order.
+  /// Bodies that touch each body in the last step, by index, each once, in order; none of those of sleepers.
   std::vector<std::vector<std::size_t>> collisionGraph() const;
   /// Seconds by phase, and what was skipped and why, on standard output.
   void printProfilingReport() const { profiler_.print(stdout); }
