@@ -341,8 +341,8 @@ int run(const Options& options) {
   };
 
   onStopSignals(requestStop);
-  drive(space, scene,
-        nextStep(space, scene));  // what energies are measured against has the first step's field
+  // What energies are measured against has the field of the first step.
+  drive(space, scene, nextStep(space, scene));
   observe(false);
   bool isStop = false;
   while (space.time() < scene.duration && !isStop) {

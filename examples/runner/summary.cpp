@@ -26,11 +26,13 @@ double contactsPerBody(const Space<double>& space) {
   return static_cast<double>(sides) / static_cast<double>(space.n());
 }
 
+std::size_t bodiesAtStart(const Scene& scene) { return scene.config.bodyCount + scene.bodies.size(); }
+
 /// Sentences on what the contacts built.
 void addContacts(std::string& text, const Scene& scene, const Space<double>& space, const History& history) {
   const std::size_t n = space.n();
   if (history.mostContacts == 0) {
-    text += "Nothing touched.\n";
+    text += n < bodiesAtStart(scene) ? "" : "Nothing touched.\n";
     return;
   }
   text += capital(counted(space.contactCount(), "contact", "contacts")) + " at the end" +
@@ -179,7 +181,7 @@ std::string summary(const Scene& scene, const Space<double>& space, const Histor
                  scene.units.mass.c_str(), sceneTime(space.time(), scene.units).c_str(),
                  counted(space.steps(), "step", "steps").c_str(),
                  hasEqualSteps(space.config()) ? "equal length" : "changing length");
-  const std::size_t atStart = scene.config.bodyCount + scene.bodies.size();
+  const std::size_t atStart = bodiesAtStart(scene);
   if (space.n() < atStart) {
     text += counted(atStart - space.n(), "body", "bodies") + format(" of %zu merged into others.\n", atStart);
   }

@@ -4,6 +4,7 @@
 # of the measured, coefficients.
 cmake_minimum_required(VERSION 3.25)
 file(REMOVE_RECURSE "${FOLDER}")
+include("${CMAKE_CURRENT_LIST_DIR}/scene_runs.cmake")
 
 set(head "duration = 0.2
 simulation = {G = 0, timeStep = 0.01, adaptiveTimeStep = false, coeffRestitution = 1, coeffFriction = 0}
@@ -21,19 +22,8 @@ restitution = 0.36
 
 # What blows took in joules, to nine digits, which CMake counts in nanojoules.
 function(loses name expected scene)
-  file(WRITE "${FOLDER}/${name}.toml" "${head}${scene}")
-  execute_process(COMMAND "${RUNNER}" "${FOLDER}/${name}.toml" -q --no-picture -o "${FOLDER}/${name}"
-    RESULT_VARIABLE status OUTPUT_VARIABLE printed ERROR_VARIABLE printed)
-  if(NOT status EQUAL 0)
-    message(FATAL_ERROR "${name}: gravel-run ended with ${status}: ${printed}")
-  endif()
-  file(STRINGS "${FOLDER}/${name}/diagnostics.csv" rows)
-  list(GET rows 0 names)
-  list(GET rows -1 row)
-  string(REPLACE "," ";" names "${names}")
-  string(REPLACE "," ";" row "${row}")
-  list(FIND names "restitution" column)
-  list(GET row ${column} lost)
+  run_scene(${name} "${head}${scene}")
+  last_value(lost ${name} restitution)
   if(NOT "${lost}000000000" MATCHES "^([0-9])[.]([0-9][0-9][0-9][0-9][0-9][0-9][0-9][0-9][0-9])")
     message(FATAL_ERROR "${name}: blows took ${lost}, which is no number below 10")
   endif()

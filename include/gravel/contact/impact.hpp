@@ -144,6 +144,17 @@ struct StraightCourse {
 
 namespace detail {
 
+/// [rad/s] by which torques have a body spin otherwise at t than in the middle of a step of length h, as in
+/// velocityAt(); none where bodies have no angular acceleration.
+template <Real S, class B>
+Vector3<S> spinByTorque(const B& bodies, std::size_t i, const S& t, const S& h) {
+  if constexpr (requires { bodies.angularAccelerations(); }) {
+    return Vector3<S>(bodies.angularAccelerations()[i]) * (t - h / S(2));
+  } else {
+    return Vector3<S>::Zero();
+  }
+}
+
 /// An impact to come; void if a body has been through another one since.
 template <Real S>
 struct ImpactEvent {

@@ -65,7 +65,8 @@ class ImpactCourses : protected ImpactForecast<S> {
         side.mass * Vector3<S>(v - side.v).dot(Vector3<S>(Vector3<S>(v + side.v) / S(2) - side.supported));
     report.frictionLoss -= gainOfSpin<S>(scene.bodies.inertiaFactors()[i], side.mass, side.r, before, w);
     scene.course.push(scene.bodies, i, S(1), {Vector3<S>(v - side.v), nothing, nothing}, t);
-    turn(scene, i, Vector3<S>(scene.course.spinAtStart(Vector3<S>(w - scene.spinByTorque(i, t)), t)), t);
+    const Vector3<S> byTorque = spinByTorque<S>(scene.bodies, i, t, scene.settings.h);
+    turn(scene, i, Vector3<S>(scene.course.spinAtStart(Vector3<S>(w - byTorque), t)), t);
   }
 
   /// [m s^-2] >= 0, by which the distance d of two, 0 to a boundary, falls back: d'' = n.a + v_t^2/d.

@@ -79,15 +79,8 @@ struct ImpactScene {
   /// At t [s] since the start of the step; what nothing moves spins as it does in the frame.
   Vector3<S> spin(std::uint32_t i, const S& t) const {
     const Vector3<S> w = spinOf(bodies, i);
-    return isMovable(bodies, i) ? Vector3<S>(course.spinAt(w, t) + spinByTorque(i, t)) : w;
-  }
-  /// The part of that by which it is before or after the middle of the step, as in velocityAt().
-  Vector3<S> spinByTorque(std::uint32_t i, const S& t) const {
-    if constexpr (requires { bodies.angularAccelerations(); }) {
-      return Vector3<S>(bodies.angularAccelerations()[i]) * (t - settings.h / S(2));
-    } else {
-      return Vector3<S>::Zero();
-    }
+    return isMovable(bodies, i) ? Vector3<S>(course.spinAt(w, t) + spinByTorque<S>(bodies, i, t, settings.h))
+                                : w;
   }
   /// What support makes of the velocity of a movable body at t [s] since the start of the step.
   Vector3<S> velocityBySupport(std::uint32_t i, const S& t) const {

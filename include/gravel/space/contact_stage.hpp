@@ -235,6 +235,7 @@ class ContactStage {
   const std::vector<Impact<Scalar>>& impacts() const {
     return record_.hasParts() ? record_.impacts() : impacts_.impacts();
   }
+
   /// The same of the bodies that are there, where it is not the same: made when somebody looks, since bodies
   /// may be removed one by one.
   struct Present {

@@ -105,10 +105,10 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
       const auto partner = [&](std::uint32_t i, std::uint64_t id, const Vector3<Scalar>& v) {
         const Vector3<Scalar> start = detail::spinOf(bodies, i);
         const bool movable = detail::isMovable(bodies, i);
-        const Vector3<Scalar> byTorque =
-            Vector3<Scalar>(bodies.angularAccelerations()[i]) * (impact.time - h / Scalar(2));
         const Vector3<Scalar> w =
-            movable ? Vector3<Scalar>(course.spinAt(start, impact.time) + byTorque) : start;
+            movable ? Vector3<Scalar>(course.spinAt(start, impact.time) +
+                                      detail::spinByTorque<Scalar>(bodies, i, impact.time, h))
+                    : start;
         return typename Collision<Scalar>::Partner{
             BodyId{id}, bodies.masses()[i], bodies.radii()[i], !movable, MaterialId{bodies.materials()[i]}, v,
             w};

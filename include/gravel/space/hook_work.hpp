@@ -100,19 +100,16 @@ class HookWork {
     parallelFor(bodies.size(), detail::bodyGrain, [&](std::size_t i) { torques_[i] = bodies[i].torque(); });
     const Scalar half = time_ / Scalar(2);
     const Sums change = (powerOf(bodies, forces, torques_) - power_) * half;
-    const Scalar pushed =
-        byWay_
-            ? crossed_ +
-                  sumOver(
-                      bodies, Scalar(0),
-                      [&](std::size_t i) {
-                        return bodies[i].inverseMass() > Scalar(0)
-                                   ? Scalar(of(forces_, i).dot(ways_[i]) +
-                                            Vector3<Scalar>(of(forces, i) - of(forces_, i)).dot(middles_[i]) *
-                                                half)
-                                   : Scalar(0);
-                      })
-            : Scalar(done_[0] + change[0]);
+    Scalar pushed = done_[0] + change[0];
+    if (byWay_) {
+      pushed = crossed_ + sumOver(bodies, Scalar(0), [&](std::size_t i) {
+                 const Vector3<Scalar> F_0 = of(forces_, i);
+                 const Vector3<Scalar> dF = of(forces, i) - F_0;
+                 return bodies[i].inverseMass() > Scalar(0)
+                            ? Scalar(F_0.dot(ways_[i]) + dF.dot(middles_[i]) * half)
+                            : Scalar(0);
+               });
+    }
     return pushed + done_[1] + change[1];
   }
 
