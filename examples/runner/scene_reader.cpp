@@ -3,6 +3,7 @@
 #include "scene.hpp"
 #include "table_reader.hpp"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <new>
@@ -101,6 +102,10 @@ void readBody(TableReader& reader, const MaterialReader& materials, const Domain
   SceneBody entry;
   Body<double>& body = entry.body;
   reader.text("name", entry.name);
+  const auto hasThisName = [&](const SceneBody& other) { return other.name == entry.name; };
+  if (!entry.name.empty() && std::any_of(bodies.begin(), bodies.end(), hasThisName)) {
+    reader.fault("name", "\"" + entry.name + "\"", "a name that no other body has");
+  }
   reader.vector("position", body.position);
   reader.vector("velocity", body.velocity);
   reader.vector("angularVelocity", body.angularVelocity);

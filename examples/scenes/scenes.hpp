@@ -273,12 +273,14 @@ struct ColumnOptions {
   Vector3<double> velocity = Vector3<double>::Zero();  ///< [m s^-1]
 };
 
-/// Grains stacked loosely in an upright column, layer upon layer, slightly out of order; none overlap.
+/// Grains stacked loosely in an upright column, layer upon layer, slightly out of order; none overlap or reach
+/// out of it.
 template <Real S = double>
 std::vector<Body<S>> grainColumn(const ColumnOptions& options) {
   const double largest = options.bodyRadius[1];
-  const double pitch = 2.2 * largest;
-  const double inner = options.radius - largest;
+  const double room = 1.1 * largest;  // of a grain about its place
+  const double pitch = 2.0 * room;
+  const double inner = options.radius - room;
   if (!(inner >= 0.0)) {
     throw std::invalid_argument("scene: the column is narrower than its largest grain");
   }
@@ -289,7 +291,7 @@ std::vector<Body<S>> grainColumn(const ColumnOptions& options) {
   for (int layer = 0; bodies.size() < options.count; ++layer) {
     for (int j = -steps; j <= steps && bodies.size() < options.count; ++j) {
       for (int i = -steps; i <= steps && bodies.size() < options.count; ++i) {
-        const Vector3<double> x(pitch * i, pitch * j, largest + pitch * layer);
+        const Vector3<double> x(pitch * i, pitch * j, room + pitch * layer);
         if (std::hypot(x[0], x[1]) > inner) {
           continue;
         }

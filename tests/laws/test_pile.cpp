@@ -9,6 +9,17 @@
 using namespace gravel;
 using namespace gravel::test;
 
+TEST_CASE("A column of grains is within its radius and above its base") {
+  scenes::ColumnOptions options;
+  options.count = 2000;
+  options.base = {0.1, -0.2, 0.3};
+  for (const Body<double>& grain : scenes::grainColumn<double>(options)) {
+    const Vec x = grain.position - options.base;
+    CHECK(x[2] >= grain.radius);
+    CHECK(std::hypot(x[0], x[1]) <= options.radius - grain.radius);
+  }
+}
+
 // In a static pile the sum of N d over contacts equals |W|, whatever friction does (virial theorem): an error
 // of the whole pile's forces, without a reference. The scene settles under damping, then rests without.
 TEST_CASE("The contacts of a pile under its own gravity carry it: sum N d is |W|") {
