@@ -6,7 +6,7 @@ include(CMakePackageConfigHelpers)
 set(gravel_cmake_dir "${CMAKE_INSTALL_DATADIR}/cmake/gravel")
 set(gravel_pc_dir "${CMAKE_INSTALL_DATADIR}/pkgconfig")
 
-install(TARGETS gravel EXPORT gravelTargets FILE_SET HEADERS DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+install(TARGETS gravel_headers EXPORT gravelTargets FILE_SET HEADERS DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
 install(EXPORT gravelTargets NAMESPACE gravel:: DESTINATION "${gravel_cmake_dir}")
 
 configure_package_config_file(
