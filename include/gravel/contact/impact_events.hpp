@@ -253,8 +253,9 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     const S pull = Base::fallsBack(a_n, boundary ? S(0) : distance, Vector3<S>(v_rel - v_n * n));
     const S noise = S(16) * Eigen::NumTraits<S>::epsilon() * (detail::maxAbs(one.v) + detail::maxAbs(two.v));
     const bool still = !(v_n + lead < -noise);
-    const S hop = pull * (h - t) / S(2);
-    if (still && (!(pull > S(0)) || !(std::max<S>(hop, S(-lead)) - v_n > noise))) {
+    // Lands at the end of the step, also on a wall that is to come on faster, by its mean.
+    const S hop = pull * (h - t) / S(2) + std::max<S>(S(0), S(-lead));
+    if (still && (!(pull > S(0)) || !(hop - v_n > noise))) {
       return false;  // nothing presses them together, or they leave already, as fast as they would
     }
     const S speed = v_n < S(0) ? S(-v_n) : S(0);
@@ -273,9 +274,9 @@ class ImpactEvents : private detail::ImpactCourses<S> {
         return true;
       }
     }
-    const bool rests = pull > S(0) && (still || S(2) * e * speed <= (S(1) - e) * pull * (h - t));
-    const S bounce = rests ? hop : S(e * speed);
-    const S target = std::max<S>(bounce, S(-lead));  // off the wall's way as well
+    const bool ends = pull > S(0) && (still || S(2) * e * speed <= (S(1) - e) * pull * (h - t));
+    const bool rests = ends || (lead < S(0) && !(e * speed > -lead));  // or the wall is as fast as it
+    const S target = rests ? hop : S(e * speed);
 
     const MassShares<S> share = massShares<S>(one.mass, one.movable, two.mass, two.movable);
     const S dv_n = target - v_n;
@@ -309,8 +310,8 @@ class ImpactEvents : private detail::ImpactCourses<S> {
                         n,
                         distance,
                         {m * dv_n, m * dv_t, m * l, true},
-                        rests || !(bounce > fall),
-                        rests && e < S(1) ? S(t + S(2) * e * speed / ((S(1) - e) * pull)) : t});
+                        rests || !(target > fall),
+                        ends && e < S(1) ? S(t + S(2) * e * speed / ((S(1) - e) * pull)) : t});
     remember(scene, e, report);
     return true;
   }
