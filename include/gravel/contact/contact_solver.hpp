@@ -51,10 +51,11 @@ class ContactSolver {
   void begin(const ContactView<S>& contacts, const B& bodies, const ContactFacts<S>& facts) {
     contacts_ = contacts;
     facts_ = facts;
-    fresh_ = true;
     const bool solved = goesOn_ && inRows_ && problem_.rows.size() == names_.size();
     goesOn_ = false;
-    detail::clearSpare(ended_);
+    if (!std::exchange(fresh_, true) || names_.empty()) {  // else nothing was solved since they ended
+      detail::clearSpare(ended_);
+    }
     const bool asMany = contacts.size() == names_.size() && contacts.size() == coloring_.rows().size();
     // The same pairs of the same bodies: colours, and who is remembered, stay.
     if (!asMany || facts.others > 0 || !sameMovable(bodies)) {
