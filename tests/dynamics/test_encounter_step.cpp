@@ -4,6 +4,8 @@
 #include <gravel/dynamics/encounter_step.hpp>
 #include <gravel/gravity/direct_sum.hpp>
 
+#include <atomic>
+
 using namespace gravel;
 using namespace gravel::test;
 
@@ -241,6 +243,46 @@ TEST_CASE("A light pair beside a star has its 314 steps a turn, however many tra
   list.resize(200, Body<double>{.position = {5, 0, 0}, .mass = 0});
   const double turn = 2 * 3.14159265358979324 * std::sqrt(1e-15 / 2e-9);
   CHECK_THAT(turn / stepFromEncounters(made(list), 1.0, 0.0, wide), WithinRel(314.159, 1e-5));
+}
+
+/// Counts the pairs that are looked at.
+struct CountedRate {
+  detail::EncounterRate<double> rate;
+  std::atomic<std::size_t>* pairs;
+
+  double of(const detail::PairMember<double>& a, const detail::PairMember<double>& b) const {
+    ++*pairs;
+    return rate.of(a, b);
+  }
+  double bound(const detail::PairBounds<double>& a, const detail::PairBounds<double>& b) const {
+    return rate.bound(a, b);
+  }
+};
+
+// Seen to fail: bodies in the order of the curve through the cube around all (8.0e6 pairs).
+TEST_CASE("One body far away does not make the search for the fastest pair one through all pairs") {
+  const std::size_t n = 4000;
+  auto bodies = made(scenes::plummerSphere<double>(n, 1));
+  bodies[0].mass() *= 100;
+  for (const double far : {1.0, 1e6, 1e9, 1e30}) {
+    bodies[1].position() = Vec(far, 0, 0);
+    std::atomic<std::size_t> pairs{0};
+    const detail::EncounterRate<double> rate{1.0, 1.0, 0.0};
+    const double most = detail::LargestPairRate<double>(bodies).of(CountedRate{rate, &pairs}, 1e300);
+    double expected = 0;
+    const auto member = [&](std::size_t i) {
+      return detail::PairMember<double>{bodies[i].position(), bodies[i].velocity(), 0, bodies[i].mass(),
+                                        true};
+    };
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t j = i + 1; j < n; ++j) {
+        expected = std::max(expected, rate.of(member(i), member(j)));
+      }
+    }
+    CAPTURE(far);
+    CHECK(most == expected);
+    CHECK(pairs < 100 * n);
+  }
 }
 
 // Seen to fail: tracers counted in the mean mass (0.73 of the step).

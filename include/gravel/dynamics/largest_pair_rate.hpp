@@ -127,7 +127,7 @@ class LargestPairRate {
  public:
   template <class BodiesType>
   explicit LargestPairRate(const BodiesType& bodies) {
-    const std::vector<std::size_t> order = mortonOrder(bodies.positions());
+    const std::vector<std::size_t> order = mortonOrderToTheEnd(bodies.positions(), leafSize);
     members_.resize(order.size());
     parallelFor(order.size(), chunk, [&](std::size_t k) {
       const auto body = bodies[order[k]];

@@ -7,6 +7,8 @@
 #include <gravel/core/types.hpp>
 
 #include <algorithm>
+#include <array>
+#include <numeric>
 #include <vector>
 
 namespace gravel {
@@ -48,6 +50,68 @@ std::uint64_t mortonCell(const S& x, const S& low, const S& length) {
   }
 }
 
+/// Sorts the indices in order[begin, end) along the curve through the cube that encloses their positions,
+/// those of one cell by index, and sets the keys of that range.
+template <class Positions>
+void sortAlongCurve(const Positions& positions, std::size_t begin, std::size_t end,
+                    std::vector<std::size_t>& order, std::vector<std::uint64_t>& keys) {
+  using Value = std::remove_cvref_t<decltype(positions[0])>;
+  using S = typename Value::Scalar;
+  Vector3<S> low = positions[order[begin]];
+  Vector3<S> high = low;
+  for (std::size_t k = begin + 1; k < end; ++k) {
+    low = low.cwiseMin(positions[order[k]]);
+    high = high.cwiseMax(positions[order[k]]);
+  }
+  const S length = (high - low).maxCoeff();
+  struct Key {
+    std::uint64_t key;
+    std::size_t index;
+  };
+  std::vector<Key> sorted(end - begin);
+  parallelFor(sorted.size(), 8192, [&](std::size_t k) {
+    const std::size_t i = order[begin + k];
+    const Vector3<S> x = positions[i];
+    sorted[k] = {mortonKey(mortonCell(S(x[0]), S(low[0]), length), mortonCell(S(x[1]), S(low[1]), length),
+                           mortonCell(S(x[2]), S(low[2]), length)),
+                 i};
+  });
+  std::sort(sorted.begin(), sorted.end(), [](const Key& a, const Key& b) {
+    return a.key < b.key || (a.key == b.key && a.index < b.index);
+  });
+  for (std::size_t k = begin; k < end; ++k) {
+    order[k] = sorted[k - begin].index;
+    keys[k] = sorted[k - begin].key;
+  }
+}
+
+/// As mortonOrder(), but more than `most` bodies of one cell come along a curve through a cube of their own,
+/// and so on, until they coincide: one body far away would else leave all others in a cell, in no order.
+template <class Positions>
+std::vector<std::size_t> mortonOrderToTheEnd(const Positions& positions, std::size_t most) {
+  std::vector<std::size_t> order(positions.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::vector<std::uint64_t> keys(order.size());
+  std::vector<std::array<std::size_t, 2>> todo;
+  if (!order.empty()) {
+    todo.push_back({0, order.size()});
+  }
+  while (!todo.empty()) {
+    const auto [begin, end] = todo.back();
+    todo.pop_back();
+    sortAlongCurve(positions, begin, end, order, keys);
+    for (std::size_t first = begin, last = begin; first < end; first = last) {
+      while (last < end && keys[last] == keys[first]) {
+        ++last;
+      }
+      if (last - first > most && last - first < end - begin) {
+        todo.push_back({first, last});
+      }
+    }
+  }
+  return order;
+}
+
 }  // namespace detail
 
 /// order[k] is the index of the body that comes k-th along the Z-order curve through the cube that encloses
@@ -55,39 +119,7 @@ std::uint64_t mortonCell(const S& x, const S& low, const S& length) {
 /// positions are required. O(N log N).
 template <class Positions>
 std::vector<std::size_t> mortonOrder(const Positions& positions) {
-  using Value = std::remove_cvref_t<decltype(positions[0])>;
-  using S = typename Value::Scalar;
-  const std::size_t n = positions.size();
-  if (n == 0) {
-    return {};
-  }
-  Vector3<S> low = positions[0];
-  Vector3<S> high = low;
-  for (std::size_t i = 1; i < n; ++i) {
-    low = low.cwiseMin(positions[i]);
-    high = high.cwiseMax(positions[i]);
-  }
-  const S length = (high - low).maxCoeff();
-  struct Key {
-    std::uint64_t key;
-    std::size_t index;
-  };
-  std::vector<Key> keys(n);
-  parallelFor(n, 8192, [&](std::size_t i) {
-    const Vector3<S> x = positions[i];
-    keys[i] = {detail::mortonKey(detail::mortonCell(S(x[0]), S(low[0]), length),
-                                 detail::mortonCell(S(x[1]), S(low[1]), length),
-                                 detail::mortonCell(S(x[2]), S(low[2]), length)),
-               i};
-  });
-  std::sort(keys.begin(), keys.end(), [](const Key& a, const Key& b) {
-    return a.key < b.key || (a.key == b.key && a.index < b.index);
-  });
-  std::vector<std::size_t> order(n);
-  for (std::size_t k = 0; k < n; ++k) {
-    order[k] = keys[k].index;
-  }
-  return order;
+  return detail::mortonOrderToTheEnd(positions, positions.size());
 }
 
 }  // namespace gravel
