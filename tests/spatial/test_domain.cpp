@@ -78,6 +78,19 @@ TEMPLATE_TEST_CASE("in a sheared box long in y the shortest image may be several
   }
 }
 
+// Where a unit in the last place is more than a box. Seen to fail: never ended, a box at a time.
+TEMPLATE_TEST_CASE("the image of a separation of too many boxes for its digits is found at once", "", float,
+                   double, long double) {
+  using S = TestType;
+  const auto domain = Domain<S>::shearPeriodic({S(10), S(10), S(10)}, S(1));
+  const CounterRandom random(17);
+  for (std::size_t i = 0; i < 20; ++i) {
+    const Vector3<S> r = randomVector<S>(random, i, 1.0) * S(1e18) * S(1e18);
+    CHECK(isFinite(domain.minimumImage(r, S(0.3))));
+    CHECK(isFinite(domain.minimumImage(Vector3<S>(S(0.1), r[1], S(0)), S(0.3))));
+  }
+}
+
 TEMPLATE_TEST_CASE("the image of the opposite separation is the opposite image, bit for bit", "", float,
                    double, long double) {
   using S = TestType;

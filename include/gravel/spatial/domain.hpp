@@ -5,6 +5,8 @@
 
 #include <gravel/core/check.hpp>
 
+#include <algorithm>
+
 namespace gravel {
 
 enum class DomainKind { Open, Periodic, ShearPeriodic };
@@ -167,7 +169,9 @@ class Domain {
   void nearerBox(const Vector3<S>& r, const S& home, const S& time, Vector3<S>& best, S& boxes) const {
     const S at = best[0];
     const S near = at < S(0) ? S(-1) : S(1);  // the side to look at first
-    S best_sq = at * at + best[1] * best[1];
+    // More than half a box in x and in y is rounding, of separations that are no numbers of boxes any more.
+    S best_sq =
+        std::min<S>(at * at + best[1] * best[1], lengths_[0] * lengths_[0] + lengths_[1] * lengths_[1]);
     S out = lengths_[0] - near * at;  // [m] in x of the nearest one k boxes out
     for (S k(1); out * out < best_sq; k += S(1), out += lengths_[0]) {
       for (const S& side : {S(near * k), S(-near * k)}) {
