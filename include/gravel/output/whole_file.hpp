@@ -29,7 +29,7 @@ inline std::error_code writeParts(const std::filesystem::path& path, const FileP
   }
   std::error_code error;
   for (const std::string_view part : parts) {
-    if (!error && std::fwrite(part.data(), 1, part.size(), file) != part.size()) {
+    if (!error && !part.empty() && std::fwrite(part.data(), 1, part.size(), file) != part.size()) {
       error = reason();
     }
   }
