@@ -25,8 +25,11 @@ namespace gravel {
 /// closer than touching.
 inline constexpr std::size_t encounterPairs = 128;
 
-/// Masses are unlike if one body has more than so many times the mean of the others, tracers aside.
+/// Masses are unlike if one body has more than so many times the mean of the others, tracers aside,
 inline constexpr double unlikeMasses = 4;
+/// or less than the mean over this: two that are lighter still, and bound, would get less than a quarter of
+/// the steps that they ask for, as they pull each other less than a body of mean mass would.
+inline constexpr double lightMasses = 64;
 
 namespace detail {
 
@@ -180,19 +183,23 @@ void lookAtLikeliest(const Bodies<Scalar, Layout>& bodies, const Domain<Scalar>&
   });
 }
 
-/// See unlikeMasses. O(N).
+/// See unlikeMasses and lightMasses. O(N).
 template <class S, class BodiesType>
 bool haveUnlikeMasses(const BodiesType& bodies) {
   S heaviest(0);
+  S lightest(0);
   S others(0);
   std::size_t massive = 0;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const S m = S(bodies.masses()[i]);
     others += std::min<S>(m, heaviest);
     heaviest = std::max<S>(heaviest, m);
+    lightest = lesserPositive<S>(lightest, m);
     massive += m > S(0) ? 1U : 0U;
   }
-  return massive > 1 && S(static_cast<double>(massive - 1)) * heaviest > S(unlikeMasses) * others;
+  const S count = S(static_cast<double>(massive));
+  return massive > 1 && ((count - S(1)) * heaviest > S(unlikeMasses) * others ||
+                         S(lightMasses) * count * lightest < heaviest + others);
 }
 
 }  // namespace detail

@@ -32,7 +32,7 @@ S nearestSquared() {
 
 /// 0 where there is none.
 template <class S>
-S lesserRadius(const S& a, const S& b) {
+S lesserPositive(const S& a, const S& b) {
   return a > S(0) && (!(b > S(0)) || a < b) ? a : b;
 }
 
@@ -51,7 +51,7 @@ struct PairBounds {
     x_high = x_high.cwiseMax(other.x_high);
     v_low = v_low.cwiseMin(other.v_low);
     v_high = v_high.cwiseMax(other.v_high);
-    least = lesserRadius(least, other.least);
+    least = lesserPositive(least, other.least);
     most = std::max<S>(most, other.most);
     heaviest = std::max<S>(heaviest, other.heaviest);
     free = free || other.free;
@@ -69,12 +69,13 @@ struct PairBounds {
 template <class S>
 struct MeetingRate {
   S of(const PairMember<S>& a, const PairMember<S>& b) const {
-    return rate(a.free || b.free, lesserRadius(a.r, b.r), Vector3<S>(a.x - b.x), S(a.r + b.r),
+    return rate(a.free || b.free, lesserPositive(a.r, b.r), Vector3<S>(a.x - b.x), S(a.r + b.r),
                 Vector3<S>(a.v - b.v));
   }
   /// No pair of theirs has more.
   S bound(const PairBounds<S>& a, const PairBounds<S>& b) const {
-    return rate(a.free || b.free, lesserRadius(a.least, b.least), a.apart(b), S(a.most + b.most), a.speed(b));
+    return rate(a.free || b.free, lesserPositive(a.least, b.least), a.apart(b), S(a.most + b.most),
+                a.speed(b));
   }
 
  private:
