@@ -97,6 +97,30 @@ TEST_CASE("Two that merge keep all that is kept, and the ledger has what they lo
   }
 }
 
+// Two equal ones without spin, that meet at a distance b of their ways: L = m v b/2 goes into the spin of one
+// of 2 m and radius 2^(1/3) r, so that what was m v^2/4 becomes L^2/(2 I), more if they graze. Nothing rubs.
+// Seen to fail: what their spins gain while they stick to each other until the step ends booked as friction
+// (-0.025 J of -0.068 at b = 0.99 d).
+TEST_CASE("What two that merge lose of their motion is restitution, also where it is a gain, not friction") {
+  for (const double share : {0.0, 0.5, 0.99}) {
+    for (const double mu : {0.0, 0.5}) {
+      CAPTURE(share, mu);
+      SimulationConfig<double> config = plain(0.01);
+      config.coeffFriction = config.coeffStaticFriction = mu;
+      Space<double> space(config);
+      const double r = 0.1, m = 0.5, v = 1.0, b = share * 2 * r;
+      space.addBody(ball({-0.3, b / 2, 0}, {v / 2, 0, 0}, r, m));
+      space.addBody(ball({0.3, -b / 2, 0}, {-v / 2, 0, 0}, r, m));
+      space.setCollisionHook(mergeAll);
+      advance(space, 100);
+      REQUIRE(space.n() == 1);
+      const double L = m * v * b / 2, I = 0.4 * 2 * m * std::cbrt(4.0) * r * r;
+      CHECK(space.energyLedger().friction == 0.0);
+      CHECK_THAT(space.energyLedger().restitution, WithinAbs(m * v * v / 4 - L * L / (2 * I), 1e-15));
+    }
+  }
+}
+
 namespace {
 
 /// How far the ledger is off at most, where two merge that come near each other in steps of `reach` times

@@ -52,10 +52,10 @@ class ImpactCourses : protected ImpactForecast<S> {
     return true;
   }
 
-  /// The body leaves with this velocity and spin.
+  /// The body leaves with this velocity and spin. What spins lose is friction's, unless two merge.
   template <class Scene>
   void give(const Scene& scene, std::uint32_t i, const Side& side, const Vector3<S>& v, const Vector3<S>& w,
-            const S& t, ImpactReport<S>& report) {
+            const S& t, bool merges, ImpactReport<S>& report) {
     if (!side.movable) {
       return;
     }
@@ -63,7 +63,8 @@ class ImpactCourses : protected ImpactForecast<S> {
     const Vector3<S> before = scene.spin(i, t);
     report.restitutionLoss -=
         side.mass * Vector3<S>(v - side.v).dot(Vector3<S>(Vector3<S>(v + side.v) / S(2) - side.supported));
-    report.frictionLoss -= gainOfSpin<S>(scene.bodies.inertiaFactors()[i], side.mass, side.r, before, w);
+    (merges ? report.restitutionLoss : report.frictionLoss) -=
+        gainOfSpin<S>(scene.bodies.inertiaFactors()[i], side.mass, side.r, before, w);
     scene.course.push(scene.bodies, i, S(1), {Vector3<S>(v - side.v), nothing, nothing}, t);
     const Vector3<S> byTorque = spinByTorque<S>(scene.bodies, i, t, scene.settings.h);
     turn(scene, i, Vector3<S>(scene.course.spinAtStart(Vector3<S>(w - byTorque), t)), t);

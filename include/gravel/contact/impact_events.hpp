@@ -229,8 +229,8 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     impacts_.back().rests = ends && !merges;
     impacts_.back().parting = merges ? S(0) : parting;
     remember(scene, std::clamp<S>(impacts_.back().parting / speed, S(0), S(1)), report, ends);
-    give(scene, event.first, one, outcome.velocity1, outcome.angularVelocity1, t, report);
-    give(scene, event.second, two, outcome.velocity2, outcome.angularVelocity2, t, report);
+    give(scene, event.first, one, outcome.velocity1, outcome.angularVelocity1, t, merges, report);
+    give(scene, event.second, two, outcome.velocity2, outcome.angularVelocity2, t, merges, report);
     const S sheared = two.movable ? S(two.mass * Vector3<S>(v2 - two.v).dot(drift)) : S(0);
     report.restitutionLoss -= sheared;  // both as the first one sees them
     report.driftWork -= sheared;

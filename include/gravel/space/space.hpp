@@ -118,8 +118,8 @@ class Space : public Settings<Scalar> {
   void setForceHook(ForceHook<Scalar, Layout> hook);
   /// The user's own outcome of each collision of two bodies: bounce, merge, or velocities of his own; an
   /// empty one takes it away again. Two that merge become one at the end of the step (see `merged()`): of
-  /// them the fixed one keeps its id, else the heavier, else the one of the smaller id. Energy of motion that
-  /// is lost is booked as `restitution`, that of spins also as `friction`, the potential's as `exchange`.
+  /// them the fixed one keeps its id, else the heavier, else the one of the smaller id. The energy of motion
+  /// that is lost is booked as `restitution`, that of the potential as `exchange`.
   void setCollisionHook(CollisionHook<Scalar> hook) {
     this->inStep_.refuse("setCollisionHook()");
     contact_.collisionHook = std::move(hook);
