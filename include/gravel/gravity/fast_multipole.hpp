@@ -176,9 +176,12 @@ class FastMultipole {
   void gather(const Positions& positions, const Masses& masses) {
     const std::size_t n = positions.size();
     tree_.resize(n);
+    // Far from the origin centres of mass, and with them what dipoles are left, would be right to the last
+    // bits of its distance.
+    const Vector3<S> offset = images_.isOpen() ? units_.offset() : Vector3<S>(Vector3<S>::Zero());
     parallelFor(n, 4096, [&](std::size_t row) {
       const std::uint32_t i = tree_.body[row];
-      const Vector3<S> x = images_.home(positions[i]) * units_.perLength();
+      const Vector3<S> x = Vector3<S>(images_.home(positions[i]) - offset) * units_.perLength();
       tree_.x[row] = x[0];
       tree_.y[row] = x[1];
       tree_.z[row] = x[2];

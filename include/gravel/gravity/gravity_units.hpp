@@ -76,6 +76,10 @@ class GravityUnits {
     for (int axis = 0; axis < 3; ++axis) {
       const S half = box[axis] > S(0) ? S(box[axis] / S(2)) : S(high[axis] - low[axis]);
       extent = std::max(extent, half);
+      const bool positive = low[axis] > S(0);
+      const S near = positive ? low[axis] : std::min<S>(high[axis], S(0));
+      const S far = positive ? high[axis] : low[axis];
+      offset_[axis] = (positive ? far <= S(2) * near : far >= S(2) * near) ? S(S(2) * near) : S(0);
     }
     lengthExponent_ = exponentOf(extent);
     massExponent_ = exponentOf(heaviest);
@@ -88,6 +92,10 @@ class GravityUnits {
   std::size_t sources() const { return sources_; }  ///< bodies with mass
   const S& low() const { return low_; }             ///< least and greatest z [m]
   const S& high() const { return high_; }
+  /// [m] What can be taken off all positions without any rounding: along an axis on which they all are on one
+  /// side of the origin, at no more than twice the distance of the nearest, that distance (Sterbenz 1974,
+  /// Floating-Point Computation); along others 0.
+  const Vector3<S>& offset() const { return offset_; }
 
   /// x -> x G in the units of the caller, out of range only if the result is.
   class Factor {
@@ -182,6 +190,7 @@ class GravityUnits {
   std::size_t sources_ = 0;
   S low_ = S(0);
   S high_ = S(0);
+  Vector3<S> offset_ = Vector3<S>::Zero();
 };
 
 }  // namespace gravel::detail
