@@ -273,8 +273,8 @@ struct ColumnOptions {
   Vector3<double> velocity = Vector3<double>::Zero();  ///< [m s^-1]
 };
 
-/// Grains stacked loosely in an upright column, layer upon layer, slightly out of order; none overlap or reach
-/// out of it.
+/// Grains stacked loosely in an upright column, layer upon layer, slightly out of order; none overlap or
+/// reach out of it.
 template <Real S = double>
 std::vector<Body<S>> grainColumn(const ColumnOptions& options) {
   const double largest = options.bodyRadius[1];
