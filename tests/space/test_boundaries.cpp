@@ -367,12 +367,153 @@ TEST_CASE("A plate that goes on speeding up carries a ball, however much faster 
   }
 }
 
-// A corner that speeds up by 20 g, whose walls have friction: the ball in it hops from the one to the other,
-// and each carries it in the first half of a step in which it is on the other at the end. Seen to fail: such
-// a contact is told of no more, as planes that change their velocity have contacts begun anew; a third of all
-// impulses are missing.
+// From a plate that speeds up by A what has no weight is seen to fall by A, and rests on it like what has:
+// balls of a stack have the plate's velocity, and the plate bears all of them. What lands on it comes to rest
+// after the time of all bounces, v (1 + e)/((1 - e) A) at v from its start. Seen to fail, as nothing but |a|
+// told a gap of rounding from one that opens: a ball was a contact in one step and struck in the next, its
+// velocity off by A h/2; stacks never rested, with velocities off by up to 1.4 A h and the force by 1.0 of
+// itself, and what landed did so for 5 to 50 steps more.
+TEST_CASE("What has no weight rests on a plate that goes on speeding up, alone, stacked and after a fall") {
+  for (const double dt : {2e-3, 1e-3}) {
+    for (const double a : {g, 10 * g}) {
+      for (const double e : {0.0, 0.5, 0.9}) {
+        for (const std::size_t parts : {std::size_t{1}, std::size_t{4}}) {
+          for (const int balls : {1, 2, 5, 10}) {
+            CAPTURE(dt, a, e, parts, balls);
+            SimulationConfig<double> config = plain(dt);
+            config.coeffRestitution = e;
+            config.coeffFriction = config.coeffStaticFriction = 0.5;
+            config.contactSubsteps = parts;
+            Space<double> space(config);
+            space.addPlane({0, 0, 1}, 0.0);
+            for (int k = 0; k < balls; ++k) {
+              space.addBody(ball({0, 0, 0.1 + 0.2 * k}, {0, 0, 0}, 0.1));
+            }
+            double speed = 0.0, force = 0.0;
+            std::size_t blows = 0;
+            for (int i = 0; i * dt < 1; ++i) {
+              space.setPlaneVelocity(0, {0, 0, a * (i + 0.5) * dt});
+              advance(space, 1);
+              if (i * dt > 0.7) {
+                blows += space.impacts().size();
+                force = std::max(force, std::abs(-space.planeForce(0)[2] / (balls * a) - 1));
+                for (std::size_t k = 0; k < space.n(); ++k) {
+                  speed = std::max(speed, std::abs(space.body(k).velocity()[2] - a * (i + 1) * dt));
+                }
+              }
+            }
+            CHECK(blows == 0);
+            CHECK(speed < 1e-6 * a * dt);
+            CHECK(force < 1e-6);
+            CHECK_THAT(space.energyLedger().total(), WithinAbs(0, 1e-12 * balls * a * a));
+          }
+        }
+      }
+    }
+  }
+  for (const double e : {0.0, 0.5}) {
+    for (const double dt : {2e-3, 1e-3}) {
+      for (const std::size_t parts : {std::size_t{1}, std::size_t{3}}) {
+        CAPTURE(e, dt, parts);
+        SimulationConfig<double> config = plain(dt);
+        config.coeffRestitution = e;
+        config.contactSubsteps = parts;
+        Space<double> space(config);
+        space.addPlane({0, 0, 1}, 0.0);
+        space.addBody(ball({0, 0, 0.105}, {0, 0, 0}, 0.1));
+        const double a = 2 * g, end = std::sqrt(2 * 0.005 / a) * (1 + e) / (1 - e);
+        double last = 0.0;
+        for (int i = 0; i * dt < 0.5; ++i) {
+          space.setPlaneVelocity(0, {0, 0, a * (i + 0.5) * dt});
+          advance(space, 1);
+          last = space.impacts().empty() ? last : space.time();
+        }
+        CHECK_THAT(last, WithinAbs(end, 2 * dt));
+      }
+    }
+  }
+}
+
+// By the principle of equivalence a blow on what rests so is that in a field. Seen to fail, by a velocity of
+// the ball that rests that is off by up to A h/2: places were off by 2.2e-3, 6.3e-4 and 1.4e-4 m for e = 0.9
+// as steps are halved.
+TEST_CASE("A ball strikes one that rests on a plate which speeds up as it does in a field") {
+  for (const double dt : {4e-3, 2e-3, 1e-3}) {
+    for (const double e : {0.5, 0.9}) {
+      CAPTURE(dt, e);
+      const auto placesAfter = [&](bool carried) {
+        SimulationConfig<double> config = plain(dt);
+        config.coeffRestitution = e;
+        config.coeffFriction = config.coeffStaticFriction = 0.5;
+        Space<double> space(config);
+        space.addPlane({0, 0, 1}, 0.0);
+        space.setUniformField({0, 0, carried ? 0.0 : -g});
+        space.addBody(ball({0, 0, 0.1}, {0, 0, 0}, 0.1, 2.0));
+        space.addBody(ball({0.05, 0, 0.7}, {0, 0, -1}, 0.1));
+        for (int i = 0; i < std::lround(0.4 / dt); ++i) {
+          space.setPlaneVelocity(0, {0, 0, carried ? g * (i + 0.5) * dt : 0.0});
+          advance(space, 1);
+        }
+        const Vec way(0, 0, carried ? g * 0.4 * 0.4 / 2 : 0.0);
+        return std::array<Vec, 2>{space.body(0).position() - way, space.body(1).position() - way};
+      };
+      const std::array<Vec, 2> carried = placesAfter(true);
+      const std::array<Vec, 2> falling = placesAfter(false);
+      CHECK((carried[0] - falling[0]).norm() < 1e-5);
+      CHECK((carried[1] - falling[1]).norm() < 1e-5);
+    }
+  }
+}
+
+// A heap in a box that carries it up, without weight, and the same in a field of that strength. Seen to fail:
+// 1400 to 2050 blows in a step, and the floor's force fluctuated by 12 to 16 %.
+TEST_CASE("A heap without weight comes to rest in a box that goes on speeding up, as in a field") {
+  for (const double e : {0.0, 0.3}) {
+    CAPTURE(e);
+    const double dt = 2e-3, r = 0.05, m = 0.5;
+    SimulationConfig<double> config = plain(dt);
+    config.coeffRestitution = e;
+    config.coeffFriction = config.coeffStaticFriction = 0.5;
+    config.contactSubsteps = 1;
+    Space<double> space(config);
+    const std::vector<std::size_t> walls = space.addBox({0, 0, 0}, {0.5, 0.5, 3});
+    const CounterRandom random(3, 0);
+    int number = 0;
+    for (int k = 0; k < 3; ++k) {
+      for (int j = 0; j < 4; ++j) {
+        for (int i = 0; i < 4; ++i, ++number) {
+          const Vec shift = 0.01 * random.direction(static_cast<std::uint64_t>(number));
+          space.addBody(
+              ball(Vec(0.07 + 0.12 * i, 0.07 + 0.12 * j, 0.07 + 0.12 * k) + shift, {0, 0, 0}, r, m));
+        }
+      }
+    }
+    std::size_t blows = 0;
+    double least = 1e9, most = 0.0;
+    const int steps = 1500;
+    for (int i = 0; i < steps; ++i) {
+      for (std::size_t w = 0; w < walls.size(); ++w) {  // across their normals, the velocity at the end
+        space.setPlaneVelocity(walls[w], {0, 0, g * (i + (w < 4 ? 1.0 : 0.5)) * dt});
+      }
+      advance(space, 1);
+      if (i >= steps - 300) {
+        blows += space.impacts().size();
+        const double force = -space.planeForce(walls[4])[2] / (48 * m * g);
+        least = std::min(least, force);
+        most = std::max(most, force);
+      }
+    }
+    CHECK(blows < 60);
+    CHECK(most - least < 0.03);
+  }
+}
+
+// A corner that speeds up by 50 g, whose walls have friction: the ball in it hops from the one to the other,
+// by more than the thousandth of its radius at which it would rest, and each carries it in the first half of
+// a step in which it is on the other at the end. Seen to fail: such a contact is told of no more, as planes
+// that change their velocity have contacts begun anew; a third of all impulses are missing.
 TEST_CASE("Planes that speed up are told the force of all that they give to a body, in every step") {
-  const double dt = 2e-3, a = 20 * g;
+  const double dt = 2e-3, a = 50 * g;
   SimulationConfig<double> config = plain(dt);
   config.coeffRestitution = 0.5;
   config.coeffFriction = config.coeffStaticFriction = 0.5;
@@ -381,17 +522,20 @@ TEST_CASE("Planes that speed up are told the force of all that they give to a bo
   space.addPlane({1, 0, 0}, -0.1);
   space.setUniformField({0, 0, -g});
   space.addBody(ball({0, 0, 0.1}, {0, 0, 0}, 0.1));
+  std::size_t blows = 0;
   for (std::size_t i = 0; i < 1000; ++i) {
     const double t = space.time(), mean = a * (t + dt / 2), end = a * (t + dt);
     space.setPlaneVelocity(0, {end, 0, mean});
     space.setPlaneVelocity(1, {mean, 0, end});
     const Vec before = space.body(0).velocity();
     advance(space, 1);
+    blows += space.impacts().size();
     const Vec given = Vec(space.body(0).velocity()) - before + dt * Vec(0, 0, g);
     const Vec told = -dt * (space.planeForce(0) + space.planeForce(1));
     CAPTURE(i, given[0], given[2], told[0], told[2]);
     REQUIRE((given - told).norm() < 1e-9);
   }
+  CHECK(blows > 1000);
 }
 
 // A ball falls on a plate with the path A sin(w t + p), and leaves it with (1 + e) times the plate's velocity

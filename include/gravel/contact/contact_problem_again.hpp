@@ -126,6 +126,7 @@ void ContactProblem<S>::resume(const detail::SolvedProblem<S>& all, const B& sou
   friction = kinds.rub || kinds.turn;
   again = false;
   this->bend_ = {};
+  this->carried_ = {};
   gatherBodies(source, colouring, S(0));
   std::vector<S> ways(bodies.size(), S(0));
   for (std::size_t slot = 0; slot < all.bodies.size(); ++slot) {

@@ -21,6 +21,7 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   drifting = kinds.drift;
   again = goesOn;
   this->bend_ = way.bend;
+  this->carried_ = way.carried;
   gatherBodies(source, colouring, ratio);
   fresh = fresh || !sameScales_ || rows.size() != contacts.size();
   impulses_ = &impulses;

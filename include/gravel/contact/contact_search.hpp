@@ -33,14 +33,20 @@ struct NarrowPhaseSettings {
   std::optional<Scalar> slow = std::nullopt;
   std::span<const ContactKeys> settled{};  ///< more of these, sorted
   std::span<const ContactName> before{};   ///< with which those found are compared: facts()
+  std::span<const Scalar> carried{};  ///< [m s^-2] by body, to be added to |a|: see WayAhead; empty is none
 };
 
 namespace detail {
 
-/// |a| of a body that contacts can move, else 0.
+/// |a| of a body that contacts can move, with that of what carries it; else 0.
 template <Real S, class B>
-[[gnu::always_inline]] inline S accelerationOf(const B& bodies, std::size_t i) {
-  return isMovable(bodies, i) ? safeNorm(Vector3<S>(bodies.accelerations()[i])) : S(0);
+[[gnu::always_inline]] inline S accelerationOf(const NarrowPhaseSettings<S>& settings, const B& bodies,
+                                               std::size_t i) {
+  if (!isMovable(bodies, i)) {
+    return S(0);
+  }
+  const S own = safeNorm(Vector3<S>(bodies.accelerations()[i]));
+  return settings.carried.empty() ? own : S(own + settings.carried[i]);
 }
 
 /// The gap below which two with this sum of radii touch. \param acceleration() is asked for only where a step

@@ -76,6 +76,9 @@ struct WayAhead {
   /// [s] For which accelerations acted on the velocities since bodies slid as before; where it is 0, nothing
   /// is known of that, and friction is held against the slip that it leaves.
   Scalar kick = Scalar(0);
+  /// [m s^-2] by body, of planes that go on speeding up into what leans on them; empty where none do. As seen
+  /// from such a plane bodies fall by as much more.
+  std::span<const Scalar> carried{};
 };
 
 /// What a solve did.

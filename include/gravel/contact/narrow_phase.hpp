@@ -211,7 +211,7 @@ class NarrowPhase {
     const S distance = surely ? S(0) : detail::safeNorm(r_ij);
     const bool overlaps = surely || distance < reach + settings.margin;
     const auto falls = [&] {
-      return S(detail::accelerationOf<S>(bodies, i) + detail::accelerationOf<S>(bodies, j));
+      return S(detail::accelerationOf(settings, bodies, i) + detail::accelerationOf(settings, bodies, j));
     };
     if (!(reach > S(0)) || (!overlaps && !(distance < reach + detail::marginOf(settings, reach, falls)))) {
       return false;

@@ -36,7 +36,7 @@ class ProblemBodies {
   }
 
   /// [m s^-2] Against this contacts hold a body: its acceleration; where nothing stands still, less that of
-  /// what hangs together with it.
+  /// what hangs together with it, and where planes speed up, more that of these.
   const S& fallOf(std::uint32_t slot) const { return initial[slot].fall; }
 
   /// What impulses did to the velocity of a body [m s^-1], and to its spin [rad/s].
@@ -263,6 +263,9 @@ class ProblemBodies {
     if (!bend_.empty()) {
       initial[slot].fall = std::max<S>(initial[slot].fall, safeNorm(Vector3<S>(a + bend)));
     }
+    if (movable && !carried_.empty()) {
+      initial[slot].fall += carried_[i];
+    }
     initial[slot].radius = r;
     b.inverseMass = movable ? S(source.masses()[i]) : S(0);
     b.spin = movable && r > S(0) && k > S(0) ? S(1) / k : S(0);
@@ -274,6 +277,7 @@ class ProblemBodies {
   bool sameScales_ = false;           ///< as in the last problem
   bool turns_ = false;                ///< spins may count in TurningPair
   std::span<const Vector3<S>> bend_;  ///< of WayAhead
+  std::span<const S> carried_;        ///< of WayAhead
   std::vector<IslandFall> common_;    ///< by the slot that stands for the island
   /// Above that an impulse of the last problem would leave nothing but its rounding: speeds have fallen.
   S mostGuess_ = S(0);

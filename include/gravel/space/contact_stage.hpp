@@ -61,8 +61,8 @@ class ContactStage {
   // Of planes that move: contact_stage_planes.hpp.
 
   void setPlaneVelocity(std::size_t plane, const Vector3<Scalar>& velocity);
-  /// The next solve sees planes as they move when a share (0 to 1) of the step has passed.
-  void drivePlanes(const Scalar& share);
+  /// The next solve sees planes as they move when a share (0 to 1) of the step of length h [s] has passed.
+  void drivePlanes(const Bodies& bodies, const Scalar& share, const Scalar& h);
 
   /// Before the drift of a step of length h [s] from `time`: deals the impacts inside it, each at its own
   /// time, so that the drift ends where the bodies are after them. Adds to the report of the step.
@@ -116,7 +116,8 @@ class ContactStage {
     parallelFor(bend_.size(), 512, [&](std::size_t i) {
       bend_[i] = frame.acceleration(bodies.positions()[i], bodies.velocities()[i]);
     });
-    const ContactReport<Scalar> half = solver_.solve(bodies, h, {drifts, bend_, frame.omega, h / Scalar(2)});
+    const ContactReport<Scalar> half =
+        solver_.solve(bodies, h, {drifts, bend_, frame.omega, h / Scalar(2), carried_});
     acted_ = half.iterations > 0;
     if (!acted_) {
       solver_.forget();  // its impulses are those of the solve before
@@ -247,6 +248,10 @@ class ContactStage {
   const Present& present(const Bodies& bodies) const;
 
   void setDrift(std::size_t plane, const Vector3<Scalar>& drift, const Scalar& change);
+  /// \param settled  blows, of which those that rest count like contacts
+  void findCarried(const Bodies& bodies, const Scalar& h, std::span<const Impact<Scalar>> settled = {});
+  void carryAll(const Bodies& bodies, const Scalar& h);
+  Scalar fastestSwing() const;
   void renewGeometry(const Bodies& bodies, const Config& config, const Scalar& time);
 
   template <class Course>
@@ -287,6 +292,7 @@ class ContactStage {
   StepRecord<Scalar> record_;
   ContactReport<Scalar> report_;
   std::vector<Vector3<Scalar>> bend_;  // of Hill's frame, at the last solve
+  std::vector<Scalar> carried_;        // of WayAhead, for the contacts of the last drivePlanes()
   Scalar separationLoss_ = Scalar(0);
   bool idle_ = false;
   bool moved_ = false;

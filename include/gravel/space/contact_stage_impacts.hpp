@@ -133,6 +133,9 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
     const Vector3<Scalar> after = turn.after + frame;
     q = rotated(rotated(Quaternion<Scalar>(q), before, turn.time), after, Scalar(-turn.time));
   }
+  if (!impacts_.impacts().empty()) {
+    findCarried(bodies, Scalar(h / part.length), impacts_.impacts());
+  }
   report_.impacts += blows.impacts;
   report_.postponed += blows.postponed;
   report_.restitutionLoss += blows.restitutionLoss;

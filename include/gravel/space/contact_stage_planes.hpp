@@ -3,6 +3,7 @@
 /// \file
 /// Members of `ContactStage` that concern planes which move.
 
+#include <gravel/contact/contact_islands.hpp>
 #include <gravel/space/contact_stage.hpp>
 
 namespace gravel {
@@ -14,12 +15,72 @@ void ContactStage<Scalar, Layout>::setPlaneVelocity(std::size_t plane, const Vec
 }
 
 template <Real Scalar, class Layout>
-void ContactStage<Scalar, Layout>::drivePlanes(const Scalar& share) {
+void ContactStage<Scalar, Layout>::drivePlanes(const Bodies& bodies, const Scalar& share, const Scalar& h) {
   for (const Plane<Scalar>& plane : boundaries.planes()) {
     if (!plane.isSteady()) {
       setDrift(plane.number, plane.velocityAt(share), Scalar(2) * plane.swing());
     }
   }
+  findCarried(bodies, h);
+}
+
+/// From a plane that goes on speeding up by A into what leans on it, this is seen to fall by A more: contacts
+/// give each body of its island as much. Without that what has no weight would never rest: nothing would tell
+/// a gap of rounding from one that opens, nor what A h brings together from a blow. O(bodies + contacts)
+/// where there is such a plane.
+template <Real Scalar, class Layout>
+void ContactStage<Scalar, Layout>::findCarried(const Bodies& bodies, const Scalar& h,
+                                               std::span<const Impact<Scalar>> settled) {
+  carried_.clear();
+  if (!(fastestSwing() > Scalar(0))) {
+    return;
+  }
+  std::vector<ContactName> leaning;
+  for (const Contact<Scalar>& c : contacts_) {
+    leaning.push_back(ContactName::of(c));
+  }
+  for (const Impact<Scalar>& impact : settled) {
+    if (impact.rests) {
+      leaning.push_back({impact.keys(), impact.first, impact.second});
+    }
+  }
+  const auto speedUp = [&](std::uint64_t key) {
+    for (const Plane<Scalar>& plane : boundaries.planes()) {
+      if (boundaryKey(plane.number) == key) {
+        return Scalar(Scalar(2) * plane.swing() / h);
+      }
+    }
+    return Scalar(0);
+  };
+  ContactIslands islands;
+  islands.find(std::span<const ContactName>(leaning), bodies);
+  carried_.assign(bodies.size(), Scalar(0));
+  for (const ContactName& name : leaning) {
+    if (name.second == staticPartner) {
+      Scalar& most = carried_[islands.of(name.first)];
+      most = std::max<Scalar>(most, speedUp(name.keys.second));
+    }
+  }
+  for (std::size_t i = 0; i < bodies.size(); ++i) {  // an island's name is its smallest index
+    carried_[i] = carried_[islands.of(i)];
+  }
+}
+
+/// The same while it is not known who leans on whom.
+template <Real Scalar, class Layout>
+void ContactStage<Scalar, Layout>::carryAll(const Bodies& bodies, const Scalar& h) {
+  const Scalar most = fastestSwing();
+  carried_.assign(most > Scalar(0) ? bodies.size() : 0, Scalar(Scalar(2) * most / h));
+}
+
+/// [m s^-1] >= 0, of the planes that speed up into what leans on them.
+template <Real Scalar, class Layout>
+Scalar ContactStage<Scalar, Layout>::fastestSwing() const {
+  Scalar most(0);
+  for (const Plane<Scalar>& plane : boundaries.planes()) {
+    most = std::max<Scalar>(most, plane.swing());
+  }
+  return most;
 }
 
 /// What touches the plane sees it move at this velocity, which changes by so much along n in a step. Where it

@@ -69,6 +69,7 @@ Scalar ContactStage<Scalar, Layout>::torqueWork(const Bodies& bodies, const Scal
 
 template <Real Scalar, class Layout>
 void ContactStage<Scalar, Layout>::endPart(const Scalar& start, bool last) {
+  carried_.clear();
   if (!last) {
     record_.endPart(impacts_.impacts(), start);
     if (firstActed_) {

@@ -50,9 +50,11 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
   if (goesOn) {
     settings.settled = settled();
   } else {
+    carryAll(bodies, h);
     settings.slow = std::max(config.restitutionThreshold, config.epsilon);
   }
   settings.before = solver_.names();
+  settings.carried = carried_;
   contactsChanged();
   if (goesOn && searched && settings.resting->empty() && settings.settled.empty() && report_.postponed == 0) {
     contacts_.clear();
@@ -62,6 +64,7 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
   const Profiler::Scope scope(profiler, Phase::NarrowPhase);
   narrow_.find(neighbours_.pairs(), bodies, domain, materials.view(), walls_, settings, contacts_,
                nearBoundaries(bodies, Scalar(0)));
+  carried_.clear();
   known_ = true;
 }
 

@@ -42,12 +42,13 @@ struct Space<Scalar, Layout>::Departure {
   Scalar start;  ///< [s] since the start of the step
   Scalar since;  ///< [s] since forces were last found
   Scalar h;
+  Scalar length;  ///< [s] of the step
   PartOfStep<Scalar> part;
   bool meets;  ///< anything can touch; if not, kick and drift are one pass
   explicit operator bool() const { return meets; }
   void operator()(const Scalar& kick) const {
     if (!space->contacts().empty()) {
-      space->contact_.drivePlanes(part.middle);
+      space->contact_.drivePlanes(space->bodies_, part.middle, length);
       space->resolveCollisions(true);
       space->contact_.endFirstHalf(space->bodies_, kick);
       if (space->force_.hook) {
@@ -183,6 +184,7 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
                             start,
                             apart ? Scalar(0) : Scalar(start - found),
                             contact_dt_,
+                            h,
                             {halves(2 * part + 1), halves(2)},
                             !quiet && (alone == nullptr || !contacts().empty())};
   if (!departure && alone != nullptr) {
@@ -231,7 +233,7 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
     find(contact_dt_, passed, Scalar(passed / Scalar(2)), {});
     makeUpBlows(passed);
   }
-  contact_.drivePlanes(halves(2 * part + 2));
+  contact_.drivePlanes(bodies_, halves(2 * part + 2), h);
   resolveCollisions();
   bendWay();
   if (works) {
