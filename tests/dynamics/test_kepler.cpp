@@ -2,6 +2,8 @@
 #include <gravel/core/random.hpp>
 #include <gravel/dynamics/kepler.hpp>
 
+#include <limits>
+
 using namespace gravel;
 using namespace gravel::test;
 
@@ -132,5 +134,32 @@ TEST_CASE("At the very centre nothing is finite, and the search for whole turns 
     keplerIncrements<double>(Vec::Zero(), v, 1.0, 0.1, dx, dv);
     CHECK_FALSE(isFinite(dx));
     CHECK_FALSE(isFinite(dv));
+  }
+}
+
+// Seen to fail: a body whose energy is no number, or too large for one, stood still, and whole turns of a
+// time near the largest number, or of an infinite one, were looked for without end.
+TEST_CASE("What is not finite, or has a square that is not, gives NaN; the longest time ends") {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double most = std::numeric_limits<double>::max();
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  const Vec x(1, 0, 0), v(0, 1, 0);
+  Vec dx, dv;
+  const auto isNaN = [&] {
+    return !isFinite(dx[0]) && !isFinite(dx[1]) && !isFinite(dv[0]) && !isFinite(dv[1]);
+  };
+  keplerIncrements<double>(x, Vec(0, nan, 0), 1.0, 1.0, dx, dv);
+  CHECK(isNaN());
+  keplerIncrements<double>(x, Vec(0, 1e200, 0), 1.0, 1.0, dx, dv);
+  CHECK(isNaN());
+  keplerIncrements<double>(x, v, nan, 1.0, dx, dv);
+  CHECK(isNaN());
+  for (const double h : {nan, infinity, -infinity}) {
+    keplerIncrements<double>(x, v, 1.0, h, dx, dv);
+    CHECK(isNaN());
+  }
+  for (const double h : {0.9 * most, -0.9 * most}) {
+    keplerIncrements<double>(x, v, 1.0, h, dx, dv);  // somewhere on the circle
+    CHECK_THAT((x + dx).norm(), WithinAbs(1.0, 1e-12));
   }
 }

@@ -49,8 +49,8 @@ struct Stumpff {
 /// Kepler's equation in the universal anomaly s, with ds/dt = 1/r, has a single root and a derivative r > 0;
 /// Newton's method inside a bracket that shrinks finds it always (Danby 1988, ch. 6; Wisdom & Hernandez 2015,
 /// MNRAS 453, 3015). Error: rounding, times the number of radians; deep passages on hyperbolas lose more (e =
-/// 10 with the pericentre at a tenth of the distance: 7e-14, at a thousandth: 4e-10). x = 0 gives what is not
-/// finite.
+/// 10 with the pericentre at a tenth of the distance: 7e-14, at a thousandth: 4e-10). x = 0, a v whose square
+/// is too large, and what is not finite give NaN.
 template <Real Scalar>
 void keplerIncrements(const Vector3<Scalar>& x, const Vector3<Scalar>& v, const Scalar& GM, Scalar h,
                       Vector3<Scalar>& dx, Vector3<Scalar>& dv) {
@@ -59,8 +59,8 @@ void keplerIncrements(const Vector3<Scalar>& x, const Vector3<Scalar>& v, const 
   const Scalar eta = x.dot(v);
   const Scalar beta = Scalar(2) * GM / r0 - v.squaredNorm();
   const Scalar zeta = GM - beta * r0;
-  if (!(r0 > Scalar(0)) || !isFinite(beta)) {
-    dx = dv = Vector3<Scalar>::Constant(Scalar(Scalar(0) / r0));
+  if (!(r0 > Scalar(0)) || !isFinite(beta) || !isFinite(h)) {
+    dx = dv = Vector3<Scalar>::Constant(Scalar(std::numeric_limits<double>::quiet_NaN()));
     return;
   }
   // The root lies between low and high; a turn more or less of an ellipse changes nothing.
@@ -72,7 +72,7 @@ void keplerIncrements(const Vector3<Scalar>& x, const Vector3<Scalar>& v, const 
     const Scalar period = turn * GM / beta;
     const bool turned = period > Scalar(0) && isFinite(period);
     Scalar turns = period;  // whole turns are taken off, most of them first
-    while (turned && (turns < h || turns < -h)) {
+    while (turned && (turns < h / Scalar(2) || turns < -h / Scalar(2))) {
       turns *= Scalar(2);
     }
     while (turned && turns >= period) {
