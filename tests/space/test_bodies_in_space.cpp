@@ -358,6 +358,21 @@ TEST_CASE("A body is not added where the energy that it brings cannot be told") 
   CHECK(space.body(space.addBody(at({9, 0, 0}))).position()[0] == 9.0);
 }
 
+// Seen to fail: it threw, and G was 1.
+TEST_CASE("G stays as it was where the energy that another one brings cannot be told") {
+  Space<double> space(quiet());
+  space.addBody(at({0, 0, 0}));
+  space.addBody(at({5, 0, 0}));
+  space.computeDynamics(0);
+  space.body(0).position()[0] = std::numeric_limits<double>::quiet_NaN();
+  CHECK_THROWS_AS(space.setG(1.0), std::invalid_argument);
+  CHECK(space.getG() == 0.0);
+  space.body(0).position()[0] = 0.0;
+  CHECK(space.energyLedger().exchange == 0.0);
+  space.setG(1.0);
+  CHECK_THAT(space.energyLedger().exchange, WithinRel(0.2, 1e-14));
+}
+
 // Seen to fail: what touched was looked for at the places in the list that bodies had.
 TEST_CASE("What touched in the last step is told of the bodies that are there, where they are now") {
   SimulationConfig<double> config = quiet();

@@ -275,8 +275,8 @@ class Space : public Settings<Scalar> {
   void merge(BodyId stays, BodyId goes, const Scalar& time);
   Scalar pairEnergy(std::size_t i, std::size_t j, const Scalar& time) const;
   Scalar potentialEnergy() const;
-  template <class Change>
-  void changePotential(Change&& change);
+  template <class Part>
+  void changePotential(Part& part, const Part& next);
   void checkIntegratorIn(const Domain<Scalar>& domain) const;
   void logLine(const char* line) const;
 

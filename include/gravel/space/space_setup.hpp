@@ -183,7 +183,7 @@ void Space<Scalar, Layout>::setDomain(const Domain<Scalar>& domain) {
   detail::requireFewImages(domain, getG());
   const bool turns = HillFrame<Scalar>(domain).turns() || HillFrame<Scalar>(contact_.domain).turns();
   if (turns || !(getG() == Scalar(0))) {
-    changePotential([&] { contact_.domain = domain; });
+    changePotential(contact_.domain, domain);
   } else {
     contact_.domain = domain;
     wakeAll();
@@ -198,7 +198,7 @@ void Space<Scalar, Layout>::setG(Scalar g) {
   next.G = g;
   next.validate();
   detail::requireFewImages(contact_.domain, g);
-  changePotential([&] { this->config_.G = g; });
+  changePotential(this->config_.G, g);
 }
 
 template <Real Scalar, class Layout>
@@ -209,14 +209,18 @@ void Space<Scalar, Layout>::setTimeStep(Scalar dt) {
 
 /// A change of the potential's law moves energy in or out; the ledger counts it from the first step on.
 template <Real Scalar, class Layout>
-template <class Change>
-void Space<Scalar, Layout>::changePotential(Change&& change) {
+template <class Part>
+void Space<Scalar, Layout>::changePotential(Part& part, const Part& next) {
   const Scalar before = ledgerOpen_ ? potentialEnergy() : Scalar(0);
-  change();
-  wakeAll();
-  if (ledgerOpen_) {
-    left_.exchange += before - potentialEnergy();
+  const Part last = std::exchange(part, next);
+  try {
+    const Scalar after = ledgerOpen_ ? potentialEnergy() : Scalar(0);
+    left_.exchange += before - after;
+  } catch (...) {  // a body is not what it may be, which only the new law looks at
+    part = last;
+    throw;
   }
+  wakeAll();
   forcesValid_ = false;
 }
 
