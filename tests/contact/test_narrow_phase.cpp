@@ -133,6 +133,28 @@ TEST_CASE("half-spaces that do not come in the order of their numbers are refuse
   CHECK(contacts.size() == 2);
 }
 
+// Seen to fail: what stands behind the arrays was read, and a body touched itself.
+TEST_CASE("pairs and bodies near boundaries that name no bodies are refused, and the list stays") {
+  const auto bodies = column<double>(2, 1e-3, 0.0, 1.0);
+  const std::vector<Material<double>> materials(1);
+  const std::vector<HalfSpace<double>> walls = floorAtZero<double>();
+  ContactList<double> contacts;
+  NarrowPhase<double> narrow;
+  const auto find = [&](const std::vector<Pair>& pairs, const std::vector<std::uint32_t>& near) {
+    narrow.find(pairs, bodies, Domain<double>::open(), materials, walls, {}, contacts,
+                std::span<const std::uint32_t>(near));
+  };
+  find({{0, 1}}, {0, 1});
+  REQUIRE(contacts.size() == 2);
+  for (const Pair& wrong : {Pair{0, 2}, Pair{7, 1}, Pair{1, 1}}) {
+    CHECK_THROWS_WITH(find({wrong}, {0, 1}), ContainsSubstring("pair of bodies is ") &&
+                                                 ContainsSubstring("allowed: two bodies, below 2"));
+  }
+  CHECK_THROWS_WITH(find({{0, 1}}, {0, 2}),
+                    ContainsSubstring("body near a boundary is 2; allowed: below the number of bodies, 2"));
+  CHECK(contacts.size() == 2);
+}
+
 // Seen to fail: contacts of one material with itself, or with a plane, mixed.
 TEST_CASE("a pair of materials with coefficients of its own is not mixed, nor is one with a plane") {
   auto bodies = column<double>(4, 1e-3, 0.0, 1.0);

@@ -24,6 +24,12 @@ class BoundaryContacts {
                "above that of the one before it, " + std::to_string(boundaries[b - 1].number));
       }
     }
+    for (const std::uint32_t i : nearBoundaries.value_or(std::span<const std::uint32_t>())) {
+      if (i >= bodies.size()) {
+        refuse("body near a boundary", std::to_string(i),
+               "below the number of bodies, " + std::to_string(bodies.size()));
+      }
+    }
     contacts_.clear();
     surfaces_.clear();
     if (boundaries.empty() || (nearBoundaries && nearBoundaries->empty())) {

@@ -7,6 +7,7 @@
 #include <gravel/contact/contact_list.hpp>
 #include <gravel/core/check.hpp>
 #include <gravel/core/parallel.hpp>
+#include <gravel/spatial/pair.hpp>
 
 #include <algorithm>
 #include <span>
@@ -79,6 +80,14 @@ void requireBodies(const Contact<S>& c, std::size_t count) {
   if (!known || c.first == c.second) {
     refuse("body of a contact", std::to_string(c.first) + ", " + std::to_string(c.second),
            "two bodies, below " + std::to_string(count) + ", or a boundary");
+  }
+}
+
+/// \throws std::invalid_argument for a pair of a body that is not among `count`, or of a body with itself
+[[gnu::always_inline]] inline void requireBodies(Pair pair, std::size_t count) {
+  if (pair.first >= count || pair.second >= count || pair.first == pair.second) {
+    refuse("pair of bodies", std::to_string(pair.first) + ", " + std::to_string(pair.second),
+           "two bodies, below " + std::to_string(count));
   }
 }
 

@@ -26,7 +26,9 @@ class NarrowPhase {
   /// \param boundaries half-spaces with unit normals, in increasing order of their numbers
   /// \param nearBoundaries indices of all bodies that may touch a boundary, increasing; without it every body
   ///        is looked at
-  /// \throws std::invalid_argument for a material id without an entry, or boundaries out of order
+  /// \throws std::invalid_argument for a body that is not there, a material id without an entry, or
+  /// boundaries
+  ///         out of order
   template <ContactBodies B>
   void find(std::span<const Pair> pairs, const B& bodies, const Domain<S>& domain,
             const MaterialView<S>& materials, std::span<const HalfSpace<S>> boundaries,
@@ -197,6 +199,7 @@ class NarrowPhase {
                                 Cursor& cursor) const {
     const std::uint32_t i = pair.first;
     const std::uint32_t j = pair.second;
+    detail::requireBodies(pair, spheres_.size());
     Vector3<S> drift;
     const Vector3<S> r_ij = separation(pair, domain, settings, drift);
     const S reach = spheres_[i].r + spheres_[j].r;
