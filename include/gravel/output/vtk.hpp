@@ -30,7 +30,16 @@ auto vtkNumber(const T& x) {
   } else if constexpr (requires { static_cast<double>(x); }) {
     return static_cast<double>(x);
   } else {
-    return static_cast<double>(x.value());
+    constexpr bool hasValue = requires { static_cast<double>(x.value()); };
+    static_assert(
+        hasValue,
+        "gravel: VtkPoints needs scalars that static_cast or a member value() makes a double of, see "
+        "docs/concepts.md");
+    if constexpr (hasValue) {
+      return static_cast<double>(x.value());
+    } else {
+      return 0.0;
+    }
   }
 }
 
