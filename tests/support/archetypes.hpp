@@ -125,6 +125,21 @@ struct Particle {
   std::uint32_t bits = 0;
 };
 
+/// A number that can be read and assigned, and nothing else.
+template <class T>
+class AssignedNumber {
+ public:
+  explicit AssignedNumber(T& number) : number_(&number) {}
+  operator T() const { return *number_; }
+  AssignedNumber& operator=(const T& number) {
+    *number_ = number;
+    return *this;
+  }
+
+ private:
+  T* number_;
+};
+
 /// That program's particles as bodies, in place. `swap` moves the member that is not a field along.
 template <class S>
 class ParticleStorage {
@@ -153,6 +168,15 @@ class ParticleStorage {
   static auto quaternion(S* p) { return Eigen::Map<Quaternion<S>>(p); }
   static auto quaternion(const S* p) { return Eigen::Map<const Quaternion<S>>(p); }
 
+  template <class T>
+  static AssignedNumber<T> number(T& x) {
+    return AssignedNumber<T>(x);
+  }
+  template <class T>
+  static T number(const T& x) {
+    return x;
+  }
+
   template <class F, class P>
   static decltype(auto) access(F, P& p) {
     if constexpr (std::is_same_v<F, fields::Position>) {
@@ -178,12 +202,12 @@ class ParticleStorage {
     } else if constexpr (std::is_same_v<F, fields::InertiaFactor>) {
       return (p.k);
     } else if constexpr (std::is_same_v<F, fields::Id>) {
-      return (p.name);
+      return number(p.name);
     } else if constexpr (std::is_same_v<F, fields::Material>) {
-      return (p.matter);
+      return number(p.matter);
     } else {
       static_assert(std::is_same_v<F, fields::Flags>);
-      return (p.bits);
+      return number(p.bits);
     }
   }
 

@@ -38,9 +38,9 @@ class BasicBodyProxy {
   decltype(auto) radius() const { return at(fields::Radius{}); }
   decltype(auto) inertiaFactor() const { return at(fields::InertiaFactor{}); }
 
-  BodyId id() const { return BodyId{at(fields::Id{})}; }
+  BodyId id() const { return BodyId{static_cast<std::uint64_t>(at(fields::Id{}))}; }
   std::size_t index() const { return index_; }
-  MaterialId material() const { return MaterialId{at(fields::Material{})}; }
+  MaterialId material() const { return MaterialId{static_cast<std::uint32_t>(at(fields::Material{}))}; }
   bool isFixed() const { return (at(fields::Flags{}) & static_cast<std::uint32_t>(BodyFlag::Fixed)) != 0; }
   bool isAsleep() const { return (at(fields::Flags{}) & static_cast<std::uint32_t>(BodyFlag::Asleep)) != 0; }
   /// Fixed or asleep.

@@ -44,7 +44,7 @@ ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, con
                                           bodies.masses()[i],
                                           bodies.radii()[i],
                                           !detail::isMovable(bodies, i),
-                                          MaterialId{bodies.materials()[i]},
+                                          MaterialId{static_cast<std::uint32_t>(bodies.materials()[i])},
                                           detail::velocityOf(bodies, i),
                                           detail::spinOf(bodies, i)};
   };
