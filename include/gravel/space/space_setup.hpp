@@ -68,7 +68,8 @@ void Space<Scalar, Layout>::removeBody(BodyId id) {
   const std::size_t i = bodies_.indexOf(id);
   bool known = ledgerOpen_;
   for (std::size_t k = 0; known && !(getG() == Scalar(0)) && k < n(); ++k) {
-    known = isFinite(Vector(bodies_.positions()[k]));
+    const Scalar m = bodies_.masses()[k];
+    known = isFinite(Vector(bodies_.positions()[k])) && isFinite(m) && m >= Scalar(0);
   }
   const Scalar energy = known ? bindingEnergy(i, time_) : Scalar(0);
   if (isFinite(energy)) {  // who has written what is no number must be able to get rid of it
