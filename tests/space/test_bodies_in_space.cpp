@@ -637,6 +637,17 @@ TEST_CASE("Bodies whose numbers were spoiled can be removed, one after the other
   CHECK(std::isfinite(space.energyLedger().total()));
 }
 
+// Seen to fail: the ledger had no number for ever after.
+TEST_CASE("A field that is set while a place is no number leaves the ledger one") {
+  Space<double> space(quiet());
+  space.addBody(at({0, 0, 0}));
+  space.computeDynamics(0);
+  space.body(0).position()[0] = std::numeric_limits<double>::quiet_NaN();
+  space.setUniformField({0, 0, -1});
+  space.body(0).position()[0] = 0.0;
+  CHECK(space.energyLedger().total() == 0.0);
+}
+
 // Seen to fail: neither the body of no mass nor any other could be removed.
 TEST_CASE("A body whose mass was spoiled can be removed, and so can others beside it") {
   for (const double mass : {std::numeric_limits<double>::quiet_NaN(), -1.0}) {

@@ -143,7 +143,10 @@ void Space<Scalar, Layout>::setUniformField(const Vector& g) {
     detail::refuse("uniform field", detail::formatVector(g), "finite");
   }
   if (ledgerOpen_) {  // what pulls each other is as it was
-    left_.exchange += fieldEnergy(bodies_, force_.field) - fieldEnergy(bodies_, g);
+    const Scalar change = fieldEnergy(bodies_, force_.field) - fieldEnergy(bodies_, g);
+    if (isFinite(change)) {  // what a body whose place is no number would spoil for good
+      left_.exchange += change;
+    }
   }
   force_.field = g;
   wakeAll();
