@@ -83,11 +83,16 @@ void requireBodies(const Contact<S>& c, std::size_t count) {
   }
 }
 
+/// \throws std::invalid_argument
+[[noreturn, gnu::noinline]] inline void refusePair(Pair pair, std::size_t count) {
+  refuse("pair of bodies", std::to_string(pair.first) + ", " + std::to_string(pair.second),
+         "two bodies, below " + std::to_string(count));
+}
+
 /// \throws std::invalid_argument for a pair of a body that is not among `count`, or of a body with itself
 [[gnu::always_inline]] inline void requireBodies(Pair pair, std::size_t count) {
   if (pair.first >= count || pair.second >= count || pair.first == pair.second) {
-    refuse("pair of bodies", std::to_string(pair.first) + ", " + std::to_string(pair.second),
-           "two bodies, below " + std::to_string(count));
+    refusePair(pair, count);
   }
 }
 

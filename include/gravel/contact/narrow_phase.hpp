@@ -27,8 +27,7 @@ class NarrowPhase {
   /// \param nearBoundaries indices of all bodies that may touch a boundary, increasing; without it every body
   ///        is looked at
   /// \throws std::invalid_argument for a body that is not there, a material id without an entry, or
-  /// boundaries
-  ///         out of order
+  ///         boundaries out of order
   template <ContactBodies B>
   void find(std::span<const Pair> pairs, const B& bodies, const Domain<S>& domain,
             const MaterialView<S>& materials, std::span<const HalfSpace<S>> boundaries,
