@@ -109,14 +109,8 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
             movable ? Vector3<Scalar>(course.spinAt(start, impact.time) +
                                       detail::spinByTorque<Scalar>(bodies, i, impact.time, h))
                     : start;
-        return
-            typename Collision<Scalar>::Partner{BodyId{id},
-                                                bodies.masses()[i],
-                                                bodies.radii()[i],
-                                                !movable,
-                                                MaterialId{static_cast<std::uint32_t>(bodies.materials()[i])},
-                                                v,
-                                                w};
+        return typename Collision<Scalar>::Partner{
+            BodyId{id}, bodies.masses()[i], bodies.radii()[i], !movable, bodies[i].material(), v, w};
       };
       return detail::outcomeOf(
           collisionHook, Collision<Scalar>{Scalar(time + impact.time), partner(impact.first, impact.key1, v1),
