@@ -465,9 +465,9 @@ TEST_CASE("A ball strikes one that rests on a plate which speeds up as it does i
   }
 }
 
-// A heap in a box that carries it up, without weight, and the same in a field of that strength. Seen to fail:
+// Less than a blow in five steps, where each grain struck others thirty to forty times in each. Seen to fail:
 // 1400 to 2050 blows in a step, and the floor's force fluctuated by 12 to 16 %.
-TEST_CASE("A heap without weight comes to rest in a box that goes on speeding up, as in a field") {
+TEST_CASE("A heap without weight comes to rest in a box that goes on speeding up") {
   for (const double e : {0.0, 0.3}) {
     CAPTURE(e);
     const double dt = 2e-3, r = 0.05, m = 0.5;

@@ -142,11 +142,16 @@ void Space<Scalar, Layout>::setUniformField(const Vector& g) {
   if (!isFinite(g)) {
     detail::refuse("uniform field", detail::formatVector(g), "finite");
   }
-  if (ledgerOpen_) {  // what pulls each other is as it was
-    const Scalar change = fieldEnergy(bodies_, force_.field) - fieldEnergy(bodies_, g);
-    if (isFinite(change)) {  // what a body whose place is no number would spoil for good
-      left_.exchange += change;
-    }
+  if (ledgerOpen_) {  // what pulls each other is as it was; a place that is no number had no energy before
+    left_.exchange += orderedSum(n(), 1024, Scalar(0), [&](std::size_t begin, std::size_t end) {
+      Scalar part(0);
+      for (std::size_t i = begin; i < end; ++i) {
+        const auto body = std::as_const(bodies_)[i];
+        const Scalar lost = Scalar(body.mass()) * Vector(g - force_.field).dot(Vector(body.position()));
+        part += !body.isFixed() && isFinite(lost) ? lost : Scalar(0);
+      }
+      return part;
+    });
   }
   force_.field = g;
   wakeAll();
