@@ -5,7 +5,9 @@
 #include <gravel/spatial/kdtree.hpp>
 #include <gravel/spatial/morton.hpp>
 
+#include <cmath>
 #include <numeric>
+#include <type_traits>
 
 using namespace gravel;
 using namespace gravel::test;
@@ -54,6 +56,29 @@ TEMPLATE_TEST_CASE("a k-d tree and a grid visit the points within a radius, each
     }
   }
   CHECK(total > 70000);
+}
+
+TEMPLATE_TEST_CASE("points are found where the square of a radius leaves the range of numbers", "", float,
+                   double, long double) {
+  using S = TestType;
+  const auto cloud = randomCloud<S>(300, 2.0, 0.1, 1.0, 43);
+  constexpr int exponent = std::is_same_v<S, float> ? 70 : 600;
+  for (const int e : {-exponent, 0, exponent}) {
+    std::vector<Vector3<S>> points;
+    for (const Vector3<S>& x : cloud.positions) {
+      points.push_back(Vector3<S>(std::ldexp(x[0], e), std::ldexp(x[1], e), std::ldexp(x[2], e)));
+    }
+    KDTree<S> tree;
+    tree.build(points);
+    UniformGrid<S> grid;
+    grid.build(points, std::ldexp(S(0.3), e));
+    for (std::size_t i = 0; i < points.size(); i += 11) {
+      const auto expected = bruteWithin(cloud.positions, cloud.positions[i], S(0.7));
+      CHECK(expected.size() > 1);
+      CHECK(within(tree, points[i], std::ldexp(S(0.7), e)) == expected);
+      CHECK(within(grid, points[i], std::ldexp(S(0.7), e)) == expected);
+    }
+  }
 }
 
 TEST_CASE("squared distances are handed on with the hits") {

@@ -85,13 +85,14 @@ class UniformGrid {
       first[axis] = coordinate(q[axis] - radius, axis);
       last[axis] = coordinate(q[axis] + radius, axis);
     }
-    const S radius_sq = radius * radius;
+    const detail::Within<S> isWithin(radius);
     for (std::size_t z = first[2]; z <= last[2]; ++z) {
       for (std::size_t y = first[1]; y <= last[1]; ++y) {
         const std::size_t row = (z * count_[1] + y) * count_[0];
         for (std::size_t e = start_[row + first[0]]; e < start_[row + last[0] + 1]; ++e) {
-          const S distance_sq = (entries_[e].x - q).squaredNorm();
-          if (distance_sq < radius_sq) {
+          const Vector3<S> d = entries_[e].x - q;
+          const S distance_sq = d.squaredNorm();
+          if (isWithin(d, distance_sq)) {
             visit(static_cast<std::size_t>(entries_[e].index), distance_sq);
           }
         }

@@ -38,13 +38,27 @@ class KDTree {
   std::size_t size() const { return tree_ ? tree_->cloud.points.size() : 0; }
 
   /// Calls visit(index, squared distance) for each point with distance < radius, in no promised order.
-  /// Safe from several threads at once. O(log N + hits).
+  /// Safe from several threads at once. O(log N + hits); O(N) where the square of the radius leaves the range
+  /// of numbers, since the tree is searched by squares.
   template <class Visitor>
   void forEachWithin(const Vector3<S>& q, S radius, Visitor&& visit) const {
     if (size() == 0 || !(radius > S(0))) {
       return;
     }
-    Ball<std::remove_reference_t<Visitor>> ball{tree_->cloud.points, q, radius * radius, Cut(0), visit};
+    const std::vector<Vector3<S>>& points = tree_->cloud.points;
+    const detail::Within<S> isWithin(radius);
+    const bool cuts = isWithin.bySquares() && detail::Within<Cut>(static_cast<Cut>(radius)).bySquares();
+    for (std::size_t i = 0; i < points.size() && !cuts; ++i) {
+      const Vector3<S> d = points[i] - q;
+      const S distance_sq = d.squaredNorm();
+      if (isWithin(d, distance_sq)) {
+        visit(i, distance_sq);
+      }
+    }
+    if (!cuts) {
+      return;
+    }
+    Ball<std::remove_reference_t<Visitor>> ball{points, q, radius * radius, Cut(0), visit};
     const Vector3<Cut> centre = q.template cast<Cut>();
     Cut cutRadius = static_cast<Cut>(radius);
     if constexpr (!std::is_same_v<S, Cut>) {  // the rounding of both points to Cut

@@ -3,6 +3,7 @@
 /// \file
 /// Pair search by asking an index of points: what the k-d tree and the grid have in common.
 
+#include <gravel/core/sizes.hpp>
 #include <gravel/spatial/pair.hpp>
 
 namespace gravel::detail {
@@ -14,6 +15,25 @@ struct Homes {
 
   std::size_t size() const { return spheres->size(); }
   const Vector3<S>& operator[](std::size_t i) const { return (*spheres)[i].home; }
+};
+
+/// Whether a point is nearer than a radius > 0, of which the square may leave the range of numbers.
+template <std::floating_point S>
+class Within {
+ public:
+  explicit Within(const S& radius) : radius_(radius), radius_sq_(radius * radius) {}
+  /// Whether squares tell.
+  bool bySquares() const {
+    return radius_sq_ >= std::numeric_limits<S>::min() && radius_sq_ <= std::numeric_limits<S>::max();
+  }
+  /// \param d_sq |d|^2
+  bool operator()(const Vector3<S>& d, const S& d_sq) const {
+    return bySquares() ? d_sq < radius_sq_ : safeNorm(d) < radius_;
+  }
+
+ private:
+  S radius_;
+  S radius_sq_;
 };
 
 /// Largest and second largest radius: nothing that body i asks for is farther than r_i + the largest other.
