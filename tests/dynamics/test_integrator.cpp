@@ -430,6 +430,23 @@ TEST_CASE("The step is the same bits for any number of threads") {
 }
 #endif
 
+// Seen to fail: a step that is no number made all positions such, a kind that is none was velocity Verlet.
+TEST_CASE("A step that is not finite and a kind that there is not are refused, and nothing moves") {
+  auto bodies = orbiter<double>(0.5);
+  const Body<double> before = bodies[0].load();
+  int calls = 0;
+  const auto go = [&](IntegratorKind kind, double h) {
+    integrate(
+        kind, bodies, h, false, [&](double) { ++calls; }, [] {});
+  };
+  for (const double h : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
+    CHECK_THROWS_WITH(go(IntegratorKind::Yoshida4, h), ContainsSubstring("allowed: finite"));
+  }
+  CHECK_THROWS_WITH(go(static_cast<IntegratorKind>(99), 0.1), ContainsSubstring("integrator is number 99"));
+  CHECK(calls == 0);
+  CHECK(bodies[0].position() == before.position);
+}
+
 TEST_CASE("A method that has no kicks and drifts is refused, and nothing moves") {
   auto bodies = orbiter<double>(0.5);
   const Vector3<double> start = bodies[0].position();

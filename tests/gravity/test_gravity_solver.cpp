@@ -63,6 +63,37 @@ TEST_CASE("without a gravity constant there is no force, no energy and no sum") 
   CHECK(solver.potentialEnergy(points.positions, points.masses, 0.0, 0.0) == 0.0);
 }
 
+// Seen to fail: all of it was taken without G, and a time that is no number in any case.
+TEST_CASE("what no sum would take is refused without a gravity constant as well, and so is a time") {
+  const auto points = randomMasses<double>(10, 82);
+  const std::vector<double> few(9, 1.0);
+  std::vector<Vector3<double>> a(10, Vector3<double>(1, 1, 1));
+  const std::vector<std::uint32_t> numbers{3, 10};
+  GravitySolver<double> solver;
+  for (const double G : {0.0, 1.0}) {
+    const auto refuses = [&](const auto& masses, double softening, const char* what) {
+      CHECK_THROWS_WITH(solver.accelerations(points.positions, masses, G, softening, a),
+                        ContainsSubstring(what));
+      CHECK_THROWS_WITH(
+          solver.accelerationsOf(std::vector<std::uint32_t>{3}, points.positions, masses, G, softening, a),
+          ContainsSubstring(what));
+      CHECK_THROWS_WITH(solver.potentialEnergy(points.positions, masses, G, softening),
+                        ContainsSubstring(what));
+      CHECK_THROWS_WITH(solver.energyOf(0, points.positions, masses, G, softening), ContainsSubstring(what));
+    };
+    refuses(few, 0.0, "length of masses is 9");
+    refuses(points.masses, -1.0, "softening is -1");
+    CHECK_THROWS_WITH(solver.accelerationsOf(numbers, points.positions, points.masses, G, 0.0, a),
+                      ContainsSubstring("is 10"));
+    CHECK_THROWS_WITH(solver.energyOf(10, points.positions, points.masses, G, 0.0),
+                      ContainsSubstring("is 10"));
+  }
+  CHECK(a == std::vector<Vector3<double>>(10, Vector3<double>(1, 1, 1)));
+  CHECK_THROWS_WITH(solver.setDomain(Domain<double>::shearPeriodic({9, 9, 9}, 1.0), std::nan("")),
+                    ContainsSubstring("time of a domain is nan"));
+  CHECK(solver.choice(2000) == GravitySolver<double>().choice(2000));  // it is open still
+}
+
 TEST_CASE("a tolerance is a number above 0 and at most 1") {
   GravitySolver<double> solver;
   CHECK(solver.tolerance() == 1e-5);

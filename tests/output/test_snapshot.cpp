@@ -150,6 +150,25 @@ TEST_CASE("A record that claims to be longer than the file is refused, without m
   CHECK_THROWS_AS(in.array<double>("x"), std::runtime_error);
 }
 
+// Seen to fail: the bytes themselves stood in the message.
+TEST_CASE("A record whose name is no text is told in characters that can be shown") {
+  std::vector<unsigned char> bytes(detail::snapshotMagic,
+                                   detail::snapshotMagic + sizeof detail::snapshotMagic - 1);
+  const std::string name = "a\n\033[2J\xff" + std::string(100, 'b');
+  const std::uint64_t head[3] = {name.size(), sizeof(double), 0};
+  const auto* first = reinterpret_cast<const unsigned char*>(head);
+  bytes.insert(bytes.end(), first, first + sizeof head);
+  bytes.insert(bytes.end(), name.begin(), name.end());
+  const std::uint64_t sum = detail::fnv1a(detail::fnvStart, bytes.data(), bytes.size());
+  const auto* tail = reinterpret_cast<const unsigned char*>(&sum);
+  bytes.insert(bytes.end(), tail, tail + sizeof sum);
+  const TemporaryFile file("name");
+  file.put(std::vector<char>(bytes.begin(), bytes.end()));
+  SnapshotReader in(file.path());
+  CHECK_THROWS_WITH(in.array<double>("x"),
+                    ContainsSubstring("holds 'a??[2J?" + std::string(33, 'b') + "...' of"));
+}
+
 TEST_CASE("What is no snapshot, or not there, or cannot be written, is told by its path") {
   const TemporaryFile file("text");
   file.put({'h', 'e', 'l', 'l', 'o', ' ', 'w', 'o', 'r', 'l', 'd', '!', '!', '!',

@@ -51,8 +51,10 @@ struct ContactArrays {
   auto ids() const { return id; }
   auto materials() const { return material; }
 
-  /// Called where contacts are found and taken up. \throws std::invalid_argument unless all are of one length
-  void checkLengths() const {
+  /// Called where contacts are found and taken up. O(bodies).
+  /// \throws std::invalid_argument unless all are of one length, masses and radii finite and >= 0, and
+  /// inertia factors finite and > 0
+  void check() const {
     const auto require = [this](const char* what, std::size_t length) {
       if (length != size()) {
         detail::refuse(std::string("length of ") + what, std::to_string(length),
@@ -68,6 +70,18 @@ struct ContactArrays {
     require("flags", flag.size());
     require("ids", id.size());
     require("materials", material.size());
+    for (std::size_t i = 0; i < size(); ++i) {
+      requireOf("mass", mass[i], i, detail::nonNegative<S>());
+      requireOf("radius", radius[i], i, detail::nonNegative<S>());
+      requireOf("inertia factor", inertiaFactor[i], i, detail::positive<S>());
+    }
+  }
+
+ private:
+  static void requireOf(const char* what, const S& x, std::size_t i, const detail::Range<S>& range) {
+    if (!range.contains(x)) {
+      detail::refuse(what + (" of body " + std::to_string(i)), detail::formatReal(x), range.allowed(x));
+    }
   }
 };
 
@@ -76,8 +90,8 @@ namespace detail {
 /// What can say whether it is whole does so.
 template <class B>
 void requireWhole(const B& bodies) {
-  if constexpr (requires { bodies.checkLengths(); }) {
-    bodies.checkLengths();
+  if constexpr (requires { bodies.check(); }) {
+    bodies.check();
   }
 }
 

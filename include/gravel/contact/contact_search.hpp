@@ -36,6 +36,18 @@ struct NarrowPhaseSettings {
   std::span<const Scalar> carried{};  ///< [m s^-2] by body, to be added to |a|: see WayAhead; empty is none
 };
 
+/// \throws std::invalid_argument naming the setting, its value and what is allowed
+template <Real S>
+void validate(const NarrowPhaseSettings<S>& settings) {
+  detail::require("time of a search for contacts", settings.time, detail::anyFinite<S>());
+  detail::require("epsilon of a search for contacts", settings.epsilon, detail::nonNegative<S>());
+  detail::require("margin of contacts", settings.margin, detail::nonNegative<S>());
+  detail::require("step of a search for contacts", settings.step, detail::nonNegative<S>());
+  if (settings.slow) {
+    detail::require("slow approach", *settings.slow, detail::nonNegative<S>());
+  }
+}
+
 namespace detail {
 
 /// |a| of a body that contacts can move, with that of what carries it; else 0.

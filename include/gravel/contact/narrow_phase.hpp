@@ -26,15 +26,15 @@ class NarrowPhase {
   /// \param boundaries half-spaces with unit normals, in increasing order of their numbers
   /// \param nearBoundaries indices of all bodies that may touch a boundary, increasing; without it every body
   ///        is looked at
-  /// \throws std::invalid_argument for a body that is not there, a material id without an entry, or
-  ///         boundaries out of order
+  /// \throws std::invalid_argument for a body that is not there, a material id without an entry, boundaries
+  ///         out of order, or a setting out of range
   template <ContactBodies B>
   void find(std::span<const Pair> pairs, const B& bodies, const Domain<S>& domain,
             const MaterialView<S>& materials, std::span<const HalfSpace<S>> boundaries,
             const NarrowPhaseSettings<S>& settings, ContactList<S>& out,
             std::optional<std::span<const std::uint32_t>> nearBoundaries = std::nullopt) {
     detail::requireWhole(bodies);
-    detail::require("margin of contacts", settings.margin, detail::nonNegative<S>());
+    validate(settings);
     walls_.find(bodies, materials, boundaries, settings, nearBoundaries);
     if (!pairs.empty()) {
       spheres_.resize(bodies.size());

@@ -137,7 +137,7 @@ struct NoDeparture {
 
 /// Advances all bodies by one step h. Accelerations must be those of the present positions, and are at the
 /// end.
-/// \throws std::invalid_argument for a kind whose traits have no stages
+/// \throws std::invalid_argument for a kind whose traits have no stages, or a step that is not finite
 /// \param forces  called with the part of h that has passed [s]: accelerations at the present positions; as
 ///   often as the traits' forceEvaluations say
 /// \param arrival  called once, when positions are final and the last forces are not yet evaluated
@@ -152,6 +152,7 @@ void integrate(IntegratorKind kind, Bodies<Scalar, Layout>& bodies, const Scalar
   if (method.stages.empty()) {
     detail::refuse("integrator", method.name, "one that has stages of kicks and drifts");
   }
+  detail::require("step", h, detail::anyFinite<Scalar>());
   if (!Compensation<Scalar>::carries) {
     lost = nullptr;
   }

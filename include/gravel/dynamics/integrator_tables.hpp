@@ -11,7 +11,7 @@
 /// Compositions are written as weights w_1 … w_s of velocity Verlet: a_k = w_k, and the half kicks of
 /// neighbours are one: b_k = (w_k + w_{k+1})/2.
 
-#include <gravel/core/types.hpp>
+#include <gravel/core/check.hpp>
 
 #include <array>
 #include <span>
@@ -189,9 +189,9 @@ inline constexpr IntegratorTraits traitsOf(IntegratorKind kind) {
     case IntegratorKind::SymplecticEpicycle:
       return row("SymplecticEpicycle", 2, detail::verletStages);
     case IntegratorKind::VelocityVerlet:
-      break;
+      return row("VelocityVerlet", 2, detail::verletStages);
   }
-  return row("VelocityVerlet", 2, detail::verletStages);
+  detail::refuse("integrator", "number " + std::to_string(static_cast<int>(kind)), "one of IntegratorKind");
 }
 
 }  // namespace gravel

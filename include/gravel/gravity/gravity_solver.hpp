@@ -35,9 +35,9 @@ class GravitySolver {
 
   /// Whose images pull; see DirectSum::setDomain. \param time [s] for a domain that shears
   void setDomain(const Domain<S>& domain, const S& time = S(0)) {
-    isOpen_ = domain.isOpen();
     direct_.setDomain(domain, time);
     multipoles_.setDomain(domain, time);
+    isOpen_ = domain.isOpen();
   }
 
   /// The method for that many bodies, never `Automatic`. A function of the number, of the tolerance, of the
@@ -62,6 +62,7 @@ class GravitySolver {
   void accelerations(const Positions& positions, const Masses& masses, const S& G, const S& softening,
                      Accelerations&& out) {
     if (G == S(0)) {
+      requireAll(positions, masses, softening);
       detail::requireRoom(out, positions.size());
       for (std::size_t i = 0; i < positions.size(); ++i) {
         out[i] = Vector3<S>(Vector3<S>::Zero());
@@ -77,6 +78,7 @@ class GravitySolver {
   void accelerationsOf(const Numbers& numbers, const Positions& positions, const Masses& masses, const S& G,
                        const S& softening, Accelerations&& out) {
     if (G == S(0)) {
+      requireAll(positions, masses, softening);
       detail::requireRoom(out, positions.size());
       detail::requireBodies(numbers, positions.size());
       for (std::size_t k = 0; k < numbers.size(); ++k) {
@@ -92,7 +94,9 @@ class GravitySolver {
   template <class Positions, class Masses>
   S potentialEnergy(const Positions& positions, const Masses& masses, const S& G, const S& softening) {
     S energy(0);
-    if (!(G == S(0))) {
+    if (G == S(0)) {
+      requireAll(positions, masses, softening);
+    } else {
       visit(positions.size(),
             [&](auto& method) { energy = method.potentialEnergy(positions, masses, G, softening); });
     }
@@ -103,10 +107,22 @@ class GravitySolver {
   template <class Positions, class Masses>
   S energyOf(std::size_t i, const Positions& positions, const Masses& masses, const S& G,
              const S& softening) {
-    return G == S(0) ? S(0) : direct_.energyOf(i, positions, masses, G, softening);
+    if (G == S(0)) {
+      requireAll(positions, masses, softening);
+      detail::requireBodies(std::array{i}, positions.size());
+      return S(0);
+    }
+    return direct_.energyOf(i, positions, masses, G, softening);
   }
 
  private:
+  /// What a sum refuses, but for the values of bodies, which it does not look at without G.
+  template <class Positions, class Masses>
+  static void requireAll(const Positions& positions, const Masses& masses, const S& softening) {
+    detail::requireMasses(masses, positions.size());
+    detail::require("softening", softening, detail::nonNegative<S>());
+  }
+
   template <class F>
   void visit(std::size_t bodies, F&& f) {
     if (choice(bodies) == GravityKind::Direct) {

@@ -21,6 +21,14 @@ void requireBodies(const Numbers& numbers, std::size_t bodies) {
   }
 }
 
+/// \throws std::invalid_argument unless there is a mass for each position
+template <class Masses>
+void requireMasses(const Masses& masses, std::size_t bodies) {
+  if (static_cast<std::size_t>(masses.size()) != bodies) {
+    refuse("length of masses", std::to_string(masses.size()), "that of positions, " + std::to_string(bodies));
+  }
+}
+
 /// Where a column of results knows its length, it has room for all bodies.
 /// \throws std::invalid_argument otherwise
 template <class Accelerations>
@@ -48,9 +56,7 @@ class GravityUnits {
     const std::size_t n = positions.size();
     require("G", G, anyFinite<S>());
     require("softening", softening, nonNegative<S>());
-    if (masses.size() != n) {
-      refuse("length of masses", std::to_string(masses.size()), "that of positions, " + std::to_string(n));
-    }
+    requireMasses(masses, n);
     constexpr std::size_t share = 16384;
     Range all = lookAt(positions, masses, 0, std::min(n, share));
     if (n > share) {

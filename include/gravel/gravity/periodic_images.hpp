@@ -41,11 +41,11 @@ class PeriodicImages {
   /// \param time [s] for a domain that shears \throws std::invalid_argument of requireFewImages()
   void setDomain(const Domain<S>& domain, const S& time) {
     requireFewImages(domain, S(1));
+    require("time of a domain", time, anyFinite<S>());
     domain_ = domain;
     time_ = time;
   }
   const Domain<S>& domain() const { return domain_; }
-
   bool isOpen() const { return domain_.isOpen(); }
   bool isPlane() const { return domain_.kind() == DomainKind::ShearPeriodic; }
 

@@ -112,8 +112,8 @@ class SnapshotReader {
       std::string found(head[0] <= bytes_.size() - at_ ? static_cast<std::size_t>(head[0]) : 0, '\0');
       take(found.data(), found.size(), name);
       if (found != name || head[1] != sizeof(T) || head[2] > (bytes_.size() - at_) / sizeof(T)) {
-        fail("holds '" + found + "' of " + std::to_string(head[1]) + " bytes where '" + name + "' of " +
-             std::to_string(sizeof(T)) + " is expected: another Scalar or version");
+        fail("holds '" + printable(found) + "' of " + std::to_string(head[1]) + " bytes where '" + name +
+             "' of " + std::to_string(sizeof(T)) + " is expected: another Scalar or version");
       }
       std::vector<T> values(static_cast<std::size_t>(head[2]));
       take(values.data(), values.size() * sizeof(T), name);
@@ -154,6 +154,16 @@ class SnapshotReader {
   }
 
  private:
+  /// A name that may be any bytes, as it can be shown.
+  static std::string printable(std::string name) {
+    constexpr std::size_t most = 40;
+    const bool isLong = name.size() > most;
+    name.resize(std::min(name.size(), most));
+    std::replace_if(
+        name.begin(), name.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+    return isLong ? name + "..." : name;
+  }
+
   void take(void* target, std::size_t n, const std::string& name) {
     if (n > bytes_.size() - at_) {
       fail("ends before '" + name + "'");
