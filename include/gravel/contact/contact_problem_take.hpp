@@ -36,7 +36,7 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   detail::resizeSparingly(turning, kinds.turn ? contacts.size() : 0);
   const bool slips =
       friction && (kinds.drift || kinds.spring || (way.follows && (this->turns_ || !way.bend.empty())));
-  slipTargets.assign(slips ? rows.size() : 0, Vector3<S>::Zero());
+  detail::assignSparingly(slipTargets, slips ? rows.size() : 0, Vector3<S>(Vector3<S>::Zero()));
   // A slip is at most of four speeds and spins of three components.
   const S fall = speedIn(S(this->leastFall_ * dt));
   const bool lasts = drifting || S(7) * this->fastest_ > detail::RowBefore<S>::lasting() * fall;

@@ -6,6 +6,7 @@
 
 #include <gravel/contact/contact_problem.hpp>
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -48,11 +49,11 @@ class SweepMomentum {
     });
   }
 
-  /// Sweeps are over. After some that went without, as in a heap at rest, no room is kept.
+  /// Sweeps are over. After many that went without, as in a heap at rest, no room is kept; after few it is,
+  /// for of the two solves of a step often one alone goes with it.
   void end() {
-    const auto leave = [begun = std::exchange(begun_, false)](auto& list) {
-      begun ? giveBack(list) : release(list);
-    };
+    idle_ = std::exchange(begun_, false) ? 0 : std::min(idle_ + 1, mostIdle);
+    const auto leave = [keeps = idle_ < mostIdle](auto& list) { keeps ? giveBack(list) : release(list); };
     leave(steps_);
     leave(turns_);
     leave(swept_);
@@ -85,6 +86,7 @@ class SweepMomentum {
 
  private:
   static constexpr std::size_t chunk = 512;
+  static constexpr int mostIdle = 8;
 
   struct Quad {
     Vector3<S> vector = Vector3<S>::Zero();
@@ -99,8 +101,8 @@ class SweepMomentum {
   void beginRows(const ContactProblem<S>& problem, std::size_t begin, std::size_t end) {
     begun_ = true;
     first_ = begin;
-    steps_.assign(end - begin, Quad{});
-    turns_.assign(problem.turning.empty() ? 0 : end - begin, Quad{});
+    assignSparingly(steps_, end - begin, Quad{});
+    assignSparingly(turns_, problem.turning.empty() ? 0 : end - begin, Quad{});
   }
 
   static void coast(ContactProblem<S>& problem, std::size_t slot, BodySwept& last, const S& share) {
@@ -125,6 +127,7 @@ class SweepMomentum {
   }
 
   bool begun_ = false;            ///< since the last end()
+  int idle_ = 0;                  ///< calls of end() without, up to mostIdle
   std::size_t first_ = 0;         ///< row
   std::vector<BodySwept> swept_;  ///< by slot, or by place among those of begin()
   std::vector<Quad> steps_;       ///< by row

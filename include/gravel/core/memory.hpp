@@ -33,6 +33,16 @@ void resizeAnew(std::vector<T>& v, std::size_t n) {
   resizeSparingly(v, n);
 }
 
+/// v.assign(n, x), likewise: a list that grows by one would move to pages that were never touched.
+template <class T>
+void assignSparingly(std::vector<T>& v, std::size_t n, const T& x) {
+  if (n > v.capacity()) {
+    release(v);
+    v.reserve(n + n / 32);
+  }
+  v.assign(n, x);
+}
+
 /// [bytes] Room for that is kept where it is not needed.
 inline constexpr std::size_t littleMemory = std::size_t{1} << 14U;
 
