@@ -149,6 +149,21 @@ TEMPLATE_TEST_CASE("wrapping brings a body into the half-open box, onto one of i
   CHECK(x[2] >= S(-1));
 }
 
+TEMPLATE_TEST_CASE("what is at no place is not brought into the box", "", float, double, long double) {
+  using S = TestType;
+  for (const Domain<S>& domain : boxes<S>()) {
+    for (const double nowhere : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
+      for (int axis = 0; axis < 3; ++axis) {
+        Vector3<S> x(S(0.1), S(0.2), S(0.3));
+        Vector3<S> v = Vector3<S>::Zero();
+        x[axis] = S(nowhere);
+        domain.wrap(x, v, S(0.9));
+        CHECK_FALSE(isFinite(x));
+      }
+    }
+  }
+}
+
 // Seen to fail with the sign of the speed turned round; so do the tests before and after with that of the
 // offset.
 TEMPLATE_TEST_CASE("a body that rides the sheared flow still rides it after it has left the box", "", float,

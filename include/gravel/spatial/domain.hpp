@@ -202,7 +202,7 @@ class Domain {
       boxes -= S(1);
       inside += lengths_[axis];
     }
-    x[axis] = inside < half ? inside : S(-half);  // a sum that rounds up to the open end
+    x[axis] = inside >= half ? S(-half) : inside;  // a sum that rounds up to the open end; NaN stays
     return boxes;
   }
 
