@@ -90,6 +90,22 @@ TEMPLATE_TEST_CASE("without other forces the epicycle is exact, whatever the ste
   }
 }
 
+// Seen to move nothing at all where the number of parts was beyond int's, and never to end for infinity.
+TEMPLATE_TEST_CASE("a time in which the frame turns too far to be followed is refused", "", float, double) {
+  using S = TestType;
+  for (const bool alongZ : {false, true}) {
+    const HillFrame<S> frame = alongZ ? frameOf<S>(0.0, 0.5) : frameOf<S>(-0.5, 0.0);
+    Vector3<S> dx, dv;
+    Epicycle<S>(frame, S(1000)).increments({S(1), S(0), S(1)}, {S(1), S(1), S(0)}, dx, dv);
+    CHECK(isFinite(dx));
+    REQUIRE_THROWS_WITH(
+        Epicycle<S>(frame, S(1e11)),
+        ContainsSubstring("turn of the frame in a step [rad] is 5e+10; allowed: at most 1e9"));
+    CHECK_THROWS_AS(Epicycle<S>(frame, S(-HUGE_VAL)), std::invalid_argument);
+    CHECK_THROWS_AS(Epicycle<S>(frame, S(std::nan(""))), std::invalid_argument);
+  }
+}
+
 TEST_CASE("where the frame hardly turns an epicycle is a straight line") {
   const Epicycle<double> still(frameOf<double>(0.0, 0.0), 0.5);
   const Epicycle<double> slow(frameOf<double>(1e-200, 1e-200), 0.5);

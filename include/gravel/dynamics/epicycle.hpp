@@ -9,6 +9,7 @@
 /// Tremaine 2011, MNRAS 415, 3168): order 2, one force evaluation a step, and no error where there is no
 /// other force.
 
+#include <gravel/core/check.hpp>
 #include <gravel/core/parallel.hpp>
 #include <gravel/dynamics/integrator.hpp>
 #include <gravel/spatial/domain.hpp>
@@ -50,8 +51,10 @@ template <Real Scalar>
 class Epicycle {
  public:
   /// \param h [s] of either sign; long ones are cut, so that no turn is by more than one radian
+  /// \throws std::invalid_argument where that takes more than 1e9 of them
   Epicycle(const HillFrame<Scalar>& frame, const Scalar& h) : frame_(frame) {
     Scalar fastest = std::max<Scalar>(size(frame.omega * h), size(frame.vertical * h));
+    detail::require("turn of the frame in a step [rad]", fastest, {Scalar(0), Scalar(1e9), "at most 1e9"});
     while (fastest > Scalar(1)) {
       fastest /= Scalar(2);
       parts_ *= 2;
