@@ -65,6 +65,26 @@ TEST_CASE("A boost changes no step") {
   CHECK_THAT(stepFromMotion(boosted, 0.0, wide), WithinRel(stepFromMotion(rest, 0.0, wide), 1e-12));
 }
 
+// Seen to take the longest step: the sum of momenta was beyond a float's range, and all speeds with it.
+TEST_CASE("A thousand suns that pass by in single precision take the steps of double precision") {
+  const CounterRandom random(7);
+  Bodies<double> wideOnes;
+  Bodies<float> bodies;
+  for (std::uint64_t i = 0; i < 1000; ++i) {
+    const Vec x = 1e16 * random.direction(2 * i);
+    const Vec a = 1e-3 * random.direction(2 * i + 1);
+    wideOnes[add(wideOnes, x, {3e5, 0, 0}, a)].mass() = 2e30;
+    Body<float> body;
+    body.position = x.cast<float>();
+    body.velocity = {3e5F, 0, 0};
+    body.mass = 2e30F;
+    bodies.add(body);
+    bodies[bodies.size() - 1].acceleration() = a.cast<float>();
+  }
+  const float h = stepFromMotion(bodies, 0.0F, StepLimits<float>{0.02F, 0.0F, 1e12F});
+  CHECK_THAT(h, WithinRel(stepFromMotion(wideOnes, 0.0, StepLimits<double>{0.02, 0.0, 1e12}), 1e-5));
+}
+
 // Seen to fail: a taken in the axes of space.
 TEST_CASE("A common fall changes no step, unless something stands still") {
   Bodies<double> rest;

@@ -140,3 +140,26 @@ TEST_CASE("Accelerations beyond a scalar's range ask for nothing, rather than fo
   contacts[0].second = 1;
   CHECK(PileStep<float>{}.longest(bodies, contacts) > 0.0F);
 }
+
+// Seen to ask for nothing: the sum of masses times diameters was beyond a float's range.
+TEST_CASE("Two suns that touch ask for a step in single precision as in double precision") {
+  const auto longest = [](auto scalar) {
+    using S = decltype(scalar);
+    Bodies<S> bodies;
+    for (const int side : {-1, 1}) {
+      Body<S> sun;
+      sun.position = {S(7e8 * side), S(0), S(0)};
+      sun.mass = S(2e30);
+      sun.radius = S(7e8);
+      bodies.add(sun);
+      bodies[bodies.size() - 1].acceleration() = Vector3<S>(S(-68.1 * side), S(0), S(0));
+    }
+    ContactList<S> contacts{{}, {{.material = {.staticFriction = S(0.4)}}}};
+    Contact<S> c{};
+    c.normal = Vector3<S>::Zero();
+    c.second = 1;
+    contacts.contacts.push_back(c);
+    return PileStep<S>{}.longest(bodies, contacts);
+  };
+  CHECK_THAT(longest(1.0F), WithinRel(longest(1.0), 1e-5));
+}

@@ -32,6 +32,10 @@ struct StepLimits {
 
 namespace detail {
 
+/// 8th powers of rates, and the momentum of a thousand suns, are beyond a float's range.
+template <Real Scalar>
+using RateScalar = std::conditional_t<std::is_same_v<Scalar, float>, double, Scalar>;
+
 /// What steps leave out of speeds: the flow of a sheared domain, unless a body stands still.
 template <Real Scalar>
 struct FlowLeftOut {
@@ -66,25 +70,26 @@ Scalar stepFromMotion(const Bodies<Scalar, Layout>& bodies, const Scalar& soften
   if (n == 0) {
     return limits.largest;
   }
-  Scalar mass(0);
-  Vector3<Scalar> v_cm = Vector3<Scalar>::Zero();
-  Vector3<Scalar> a_cm = Vector3<Scalar>::Zero();
+  using Sum = detail::RateScalar<Scalar>;
+  Sum mass(0);
+  Vector3<Sum> v_sum = Vector3<Sum>::Zero();
+  Vector3<Sum> a_sum = Vector3<Sum>::Zero();
   Vector3<Scalar> low = bodies[0].position();
   Vector3<Scalar> high = low;
   const auto flow = detail::FlowLeftOut<Scalar>::of(bodies, anchored ? Domain<Scalar>::open() : domain);
   for (std::size_t i = 0; i < n; ++i) {
     const auto body = bodies[i];
-    const Scalar m = body.mass();
+    const Sum m(body.mass());
     mass += m;
-    v_cm += flow.domain.lessFlow(body.position(), body.velocity()) * m;
-    a_cm += body.acceleration() * m;
+    v_sum += flow.domain.lessFlow(body.position(), body.velocity()).template cast<Sum>() * m;
+    a_sum += body.acceleration().template cast<Sum>() * m;
     low = low.cwiseMin(Vector3<Scalar>(body.position()));
     high = high.cwiseMax(Vector3<Scalar>(body.position()));
     anchored = anchored || body.isFixed();
   }
-  const Scalar share = anchored || !(mass > Scalar(0)) ? Scalar(0) : Scalar(Scalar(1) / mass);
-  v_cm *= share;
-  a_cm *= share;
+  const Sum share = anchored || !(mass > Sum(0)) ? Sum(0) : Sum(Sum(1) / mass);
+  const Vector3<Scalar> v_cm = Vector3<Sum>(v_sum * share).template cast<Scalar>();
+  const Vector3<Scalar> a_cm = Vector3<Sum>(a_sum * share).template cast<Scalar>();
   const Scalar spacing = Vector3<Scalar>(high - low).norm() / Scalar(cbrt(static_cast<double>(n)));
   const Scalar floor = std::max<Scalar>(softening, spacing / Scalar(100));
   const Scalar longest = limits.largest / limits.factor;

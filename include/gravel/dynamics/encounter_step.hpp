@@ -33,10 +33,6 @@ inline constexpr double lightMasses = 64;
 
 namespace detail {
 
-/// The rates are 8th powers: beyond a float's range.
-template <Real Scalar>
-using RateScalar = std::conditional_t<std::is_same_v<Scalar, float>, double, Scalar>;
-
 template <class S>
 S eighthRoot(const S& x) {
   using std::sqrt;

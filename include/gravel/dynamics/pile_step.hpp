@@ -48,10 +48,11 @@ class PileStep {
       ++pile.count;
       pile.mass += m;
       pile.a += m * Vector3<Scalar>(bodies.accelerations()[i]);
-      pile.d += Scalar(2) * m * Scalar(bodies.radii()[i]);
     });
     each([&](Pile& pile, const Scalar& m, std::size_t i) {
       if (pile.count > 1) {
+        // By shares: the mass of a sun times its diameter is no float.
+        pile.d += m / pile.mass * Scalar(2) * Scalar(bodies.radii()[i]);
         pile.a_sq += m * (Vector3<Scalar>(bodies.accelerations()[i]) - pile.a / pile.mass).squaredNorm();
       }
     });
@@ -67,7 +68,7 @@ class PileStep {
         const Scalar g = sqrt(Scalar(Scalar(5) / Scalar(3) * (pile.a_sq / pile.mass)));
         const Scalar rough = pile.roughness / Scalar(static_cast<double>(pile.contacts));
         const Scalar parts = Scalar(50) / (Scalar(3) + Scalar(2) * rough);  // 10 to 17
-        const Scalar h = sqrt(Scalar(pile.d / pile.mass / g)) / parts;
+        const Scalar h = sqrt(Scalar(pile.d / g)) / parts;
         least = h > Scalar(0) && h < least ? h : least;  // 0 where a scalar's range was left
       }
     }
@@ -80,7 +81,7 @@ class PileStep {
     std::size_t contacts = 0;  ///< of movable first bodies: not none where there are two bodies
     Scalar mass = Scalar(0);
     Vector3<Scalar> a = Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(0));  ///< sum of m a
-    Scalar d = Scalar(0);                                                  ///< sum of m d
+    Scalar d = Scalar(0);                                                  ///< mean of d by mass
     Scalar a_sq = Scalar(0);                                               ///< sum of m |a - a_cm|^2
     Scalar roughness = Scalar(0);                                          ///< sum over contacts
   };
