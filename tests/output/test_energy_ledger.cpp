@@ -44,6 +44,23 @@ TEST_CASE("The ledger's sums are what their names say") {
   CHECK(e.total() == 511);
 }
 
+// Seen to be infinite: masses times places were beyond a float's range.
+TEST_CASE("Planets in single precision have a centre of mass") {
+  Bodies<float> bodies;
+  Body<float> planet;
+  planet.mass = 1.898e27F;
+  planet.position = {7.8e11F, -3e11F, 0};
+  planet.velocity = {0, 1.3e4F, 0};
+  bodies.add(planet);
+  planet.position = {-7.4e11F, -3e11F, 0};
+  bodies.add(planet);
+  const ConservedQuantities<float> sums = conservedQuantities(bodies);
+  CHECK_THAT(sums.centreOfMass[0], WithinRel(2e10, 1e-5));
+  CHECK_THAT(sums.centreOfMass[1], WithinRel(-3e11, 1e-6));
+  CHECK(sums.centreOfMass[2] == 0);
+  CHECK_THAT(sums.momentum[1], WithinRel(2 * 1.898e27 * 1.3e4, 1e-6));
+}
+
 TEST_CASE("Kinetic energies of two bodies equal the hand formulas, with their own inertia") {
   Bodies<double> bodies;
   Body<double> body;

@@ -82,7 +82,7 @@ Scalar stepFromMotion(const Bodies<Scalar, Layout>& bodies, const Scalar& soften
     const Sum m(body.mass());
     mass += m;
     v_sum += flow.domain.lessFlow(body.position(), body.velocity()).template cast<Sum>() * m;
-    a_sum += body.acceleration().template cast<Sum>() * m;
+    a_sum += Vector3<Scalar>(body.acceleration()).template cast<Sum>() * m;
     low = low.cwiseMin(Vector3<Scalar>(body.position()));
     high = high.cwiseMax(Vector3<Scalar>(body.position()));
     anchored = anchored || body.isFixed();

@@ -19,27 +19,33 @@ struct ConservedQuantities {
 /// O(N); the same bits for any number of threads.
 template <Real Scalar, class Layout>
 ConservedQuantities<Scalar> conservedQuantities(const Bodies<Scalar, Layout>& bodies) {
-  using Sum = Eigen::Array<Scalar, 10, 1>;
+  // The mass of a planet times its place is beyond a float's range.
+  using Wide = std::conditional_t<std::is_same_v<Scalar, float>, double, Scalar>;
+  using Sum = Eigen::Array<Wide, 10, 1>;
   const Sum sum = orderedSum(bodies.size(), 1024, Sum(Sum::Zero()), [&](std::size_t begin, std::size_t end) {
     Sum part = Sum::Zero();
     for (std::size_t i = begin; i < end; ++i) {
       const auto body = bodies[i];
-      const Scalar m = body.mass();
-      const Vector3<Scalar> x = body.position();
-      const Vector3<Scalar> p = body.countingVelocity() * m;
+      const Wide m(body.mass());
+      const Vector3<Wide> x = Vector3<Scalar>(body.position()).template cast<Wide>();
+      const Vector3<Wide> p = body.countingVelocity().template cast<Wide>() * m;
       part[0] += m;
       part.template segment<3>(1) += p.array();
-      part.template segment<3>(4) += Vector3<Scalar>(x.cross(p) + body.spinMomentum()).array();
+      part.template segment<3>(4) +=
+          Vector3<Wide>(x.cross(p) + body.spinMomentum().template cast<Wide>()).array();
       part.template segment<3>(7) += (x * m).array();
     }
     return part;
   });
+  const Vector3<Wide> momentum = sum.template segment<3>(1).matrix();
+  const Vector3<Wide> angular = sum.template segment<3>(4).matrix();
   ConservedQuantities<Scalar> result;
-  result.mass = sum[0];
-  result.momentum = sum.template segment<3>(1).matrix();
-  result.angularMomentum = sum.template segment<3>(4).matrix();
-  if (sum[0] > Scalar(0)) {
-    result.centreOfMass = sum.template segment<3>(7).matrix() / sum[0];
+  result.mass = Scalar(sum[0]);
+  result.momentum = momentum.template cast<Scalar>();
+  result.angularMomentum = angular.template cast<Scalar>();
+  if (sum[0] > Wide(0)) {
+    const Vector3<Wide> centre = sum.template segment<3>(7).matrix() / sum[0];
+    result.centreOfMass = centre.template cast<Scalar>();
   }
   return result;
 }
