@@ -333,6 +333,17 @@ TEMPLATE_TEST_CASE("bodies: adopts a storage with bodies in it", "[bodies]", SoA
   }
 }
 
+// Seen to be refused for its moment of inertia, which is beyond a float's range.
+TEST_CASE("bodies: a storage with a giant planet in single precision keeps its inertia factor", "[bodies]") {
+  SoA::Storage<float> storage;
+  storage.resize(1);
+  storage.at(fields::Mass{}, 0) = 1.898e27F;
+  storage.at(fields::Radius{}, 0) = 6.9911e7F;
+  storage.at(fields::InertiaFactor{}, 0) = 0.276F;
+  const Bodies<float> bodies(std::move(storage));
+  CHECK(bodies[0].inertiaFactor() == 0.276F);
+}
+
 TEST_CASE("bodies: a user's memory is not written to when its bodies are refused", "[bodies]") {
   std::vector<Particle<double>> particles(2);
   particles[0].m = 1.0;

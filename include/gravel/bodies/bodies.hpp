@@ -63,8 +63,8 @@ class Bodies {
       const Body<Scalar> body = adopted(i);
       const Proxy proxy = (*this)[i];
       proxy.orientation() = body.orientation.normalized();
-      if (!body.inertia) {
-        storage_.at(fields::InertiaFactor{}, i) = detail::homogeneousFactor<Scalar>();
+      if (Scalar(proxy.inertiaFactor()) == Scalar(0)) {
+        proxy.inertiaFactor() = detail::homogeneousFactor<Scalar>();
       }
       proxy.setFixed(body.fixed);
       proxy.setAsleep(false);
@@ -283,12 +283,11 @@ class Bodies {
     }
   }
 
-  /// Body i without an inertia that a factor out of range makes: the factor is at fault, not the inertia.
+  /// Body i without an inertia: the factor is looked at by itself, and may be right where the inertia of a
+  /// giant planet is no float.
   Body<Scalar> loadUnblamed(std::size_t i) const {
     Body<Scalar> body = (*this)[i].load();
-    if (const Scalar k = storage_.at(fields::InertiaFactor{}, i); !isFinite(k) || !(k > Scalar(0))) {
-      body.inertia.reset();
-    }
+    body.inertia.reset();
     return body;
   }
 

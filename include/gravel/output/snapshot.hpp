@@ -248,10 +248,12 @@ Bodies<Scalar, SoA> loadBodies(SnapshotReader& in) {
   bodies.reserve(n);
   for (std::size_t i = 0; i < n; ++i) {
     const BasicBodyProxy<SoA::Storage<Scalar>, true> body(&fieldsOf, i);
-    bodies.add(body.load(), body.id());
-    detail::copyBody(bodies.storage(), i, fieldsOf, i);  // forces, and bits that load() rounds
+    Body<Scalar> value = body.load();
+    value.inertia.reset();  // that of a giant planet is no float
+    bodies.add(value, body.id());
+    detail::copyBody(bodies.storage(), i, fieldsOf, i);  // forces, inertia, and bits that load() rounds
   }
-  bodies.validateAll();  // load() makes no inertia of a factor out of range where mass or radius is 0
+  bodies.validateAll();  // of inertia, too
   return bodies;
 }
 
