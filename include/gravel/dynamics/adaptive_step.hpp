@@ -79,7 +79,7 @@ Scalar stepFromMotion(const Bodies<Scalar, Layout>& bodies, const Scalar& soften
   const auto flow = detail::FlowLeftOut<Scalar>::of(bodies, anchored ? Domain<Scalar>::open() : domain);
   for (std::size_t i = 0; i < n; ++i) {
     const auto body = bodies[i];
-    const Sum m(body.mass());
+    const auto m = Sum(body.mass());
     mass += m;
     v_sum += flow.domain.lessFlow(body.position(), body.velocity()).template cast<Sum>() * m;
     a_sum += Vector3<Scalar>(body.acceleration()).template cast<Sum>() * m;

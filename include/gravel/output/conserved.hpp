@@ -26,7 +26,7 @@ ConservedQuantities<Scalar> conservedQuantities(const Bodies<Scalar, Layout>& bo
     Sum part = Sum::Zero();
     for (std::size_t i = begin; i < end; ++i) {
       const auto body = bodies[i];
-      const Wide m(body.mass());
+      const auto m = Wide(body.mass());
       const Vector3<Wide> x = Vector3<Scalar>(body.position()).template cast<Wide>();
       const Vector3<Wide> p = body.countingVelocity().template cast<Wide>() * m;
       part[0] += m;
