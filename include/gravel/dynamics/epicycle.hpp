@@ -183,9 +183,10 @@ Scalar wrapBodies(Bodies<Scalar, Layout>& bodies, const Domain<Scalar>& domain, 
       }
       bodies[i].position() = x;
       bodies[i].velocity() = v;
-      if (!bodies[i].isFixed()) {
-        gained -= Scalar(bodies[i].mass()) * field.dot(Vector3<Scalar>(x - x0));
+      if (bodies[i].isFixed()) {
+        continue;
       }
+      gained -= Scalar(bodies[i].mass()) * field.dot(Vector3<Scalar>(x - x0));
       if (frame.turns()) {
         gained += Scalar(bodies[i].mass()) * (Vector3<Scalar>(v - v0).dot(v + v0) / Scalar(2) +
                                               (frame.potential(x) - frame.potential(x0)));
