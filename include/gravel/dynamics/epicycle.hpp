@@ -162,10 +162,12 @@ void integrateEpicycle(const HillFrame<Scalar>& frame, Bodies<Scalar, Layout>& b
 }
 
 /// Brings bodies that left a periodic box back in through the other side. \return the energy that they have
-/// more there [J]: what the shear of a disc puts in, and a uniform field over the length of the box
+/// more there [J]: what the shear of a disc puts in, and a uniform field over the length of the box. Both are
+/// seen at the velocities that a last kick of the field leaves.
+/// \param kick [s] of that one
 template <Real Scalar, class Layout>
 Scalar wrapBodies(Bodies<Scalar, Layout>& bodies, const Domain<Scalar>& domain, const Scalar& time,
-                  const Vector3<Scalar>& field) {
+                  const Vector3<Scalar>& field, const Scalar& kick) {
   if (domain.isOpen()) {
     return Scalar(0);
   }
@@ -188,8 +190,9 @@ Scalar wrapBodies(Bodies<Scalar, Layout>& bodies, const Domain<Scalar>& domain, 
       }
       gained -= Scalar(bodies[i].mass()) * field.dot(Vector3<Scalar>(x - x0));
       if (frame.turns()) {
-        gained += Scalar(bodies[i].mass()) * (Vector3<Scalar>(v - v0).dot(v + v0) / Scalar(2) +
-                                              (frame.potential(x) - frame.potential(x0)));
+        gained +=
+            Scalar(bodies[i].mass()) * (Vector3<Scalar>(v - v0).dot((v + v0) / Scalar(2) + kick * field) +
+                                        (frame.potential(x) - frame.potential(x0)));
       }
     }
     return gained;

@@ -48,9 +48,9 @@ class ContactStage {
   std::size_t touches(const Bodies& bodies) const;
 
   /// Brings bodies back into the domain. \return the energy that they have more there [J]
-  /// \param field [m s^-2]
-  Scalar wrap(Bodies& bodies, const Scalar& time, const Vector3<Scalar>& field) const {
-    return wrapBodies(bodies, domain, time, field);
+  /// \param field [m s^-2]  \param kick [s] for which it still acts at the end of the step
+  Scalar wrap(Bodies& bodies, const Scalar& time, const Vector3<Scalar>& field, const Scalar& kick) const {
+    return wrapBodies(bodies, domain, time, field, kick);
   }
 
   /// Finds all contacts at the present positions, for steps of length h [s]. Of pairs as near as what rests

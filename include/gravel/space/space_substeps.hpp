@@ -195,7 +195,7 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
       force_.hookWork.arrive(bodies_, contact_dt_);
     }
     contact_.boundaries.advance(contact_dt_, halves(2 * part + 1));
-    left_.work -= contact_.wrap(bodies_, Scalar(time_ + end), force_.field);
+    left_.work -= contact_.wrap(bodies_, Scalar(time_ + end), force_.field, Scalar(contact_dt_ / Scalar(2)));
     if (works && frame.turns()) {
       force_.hookWork.cross(bodies_, contact_dt_);
     }
