@@ -106,6 +106,37 @@ TEST_CASE("Space has no preferred direction: a scene turned ends turned") {
   CHECK(difference(plainEnd, turned) < 1e-11);
 }
 
+// A ball falls on one that rests on a floor: both blows of the lower one, and those that follow, are of one
+// moment, and what they lift off its floor is let go after the last of them. Seen to fail: by the rounding of
+// places and gaps 38 of these 200 were let go between them in one of the two scenes (off by up to 0.037 m/s).
+TEST_CASE("Where a scene stands makes no difference to the blows of one moment") {
+  const auto parting = [](const Vec& corner, const Vec& from, double gap) {
+    SimulationConfig<double> config = plain(0.25 / 16);
+    config.coeffRestitution = 0.7;
+    Space<double> space(config);
+    space.setUniformField({0, 0, -9.81});
+    space.addPlane({0, 0, 1}, corner[2]);
+    const Vec below = corner + Vec(0, 0, 0.1);
+    space.addBody(ball(below, {0, 0, 0}, 0.1));
+    space.addBody(ball(below + (0.2 + gap) * from, -0.4 * from, 0.1));
+    do {
+      space.computeDynamics(space.steps());
+      REQUIRE(space.steps() < 40);
+    } while (space.impacts().empty());
+    space.computeDynamics(space.steps());
+    return Vec(space.body(1).velocity() - space.body(0).velocity());
+  };
+  for (const Vec& from : {Vec(0, 0, 1), Vec(Vec(0.1, 0.2, 1).normalized())}) {
+    for (int k = 0; k < 50; ++k) {
+      const double gap = 0.2 + 0.1 * std::fmod(0.61803398875 * k, 1.0);
+      const Vec here = parting({0, 0, 0}, from, gap);
+      CAPTURE(from.transpose(), gap, here.transpose());
+      CHECK((parting({30, -21, 30}, from, gap) - here).norm() < 1e-8);
+      CHECK((parting({3, -2.1, 3}, from, gap) - here).norm() < 1e-8);
+    }
+  }
+}
+
 // The law G m t^2 / x^3 has no scale: lengths times 2^7, times times 2^5, masses times 2^11 with G to match
 // give the same numbers times powers of two, to the bit.
 TEST_CASE("Units do not matter: powers of two in length, time and mass change no bit") {

@@ -6,6 +6,7 @@
 #include <gravel/contact/time_of_impact.hpp>
 #include <gravel/core/memory.hpp>
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -32,7 +33,7 @@ template <Real S>
                                                                const ImpactFlight<S>& two,
                                                                const Vector3<S>& r, const Vector3<S>& drift,
                                                                const S& h) {
-  return {r, two.v - one.v + drift, two.a - one.a, h};
+  return {r, two.v - one.v + drift, two.a - one.a, h, std::max<S>(maxAbs(one.x), maxAbs(two.x))};
 }
 
 /// Flights found once and kept while nothing happens to the body: in a dense flow each is asked for dozens of

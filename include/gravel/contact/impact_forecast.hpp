@@ -63,7 +63,7 @@ class ImpactForecast : protected ImpactPast<S> {
   template <class Scene>
   static RelativeFlight<S> flightOf(const Scene& scene, const Flight& one, const HalfSpace<S>& wall) {
     return {Vector3<S>(one.x - wall.offset * wall.normal), Vector3<S>(one.v - wall.velocity), one.a,
-            scene.settings.h};
+            scene.settings.h, detail::maxAbs(one.x)};
   }
 
   template <class Scene>

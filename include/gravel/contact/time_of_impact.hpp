@@ -15,10 +15,11 @@ namespace gravel {
 /// which is the parabola of a constant acceleration and ends where the drift ends.
 template <Real Scalar>
 struct RelativeFlight {
-  Vector3<Scalar> r;  ///< [m] at the start
-  Vector3<Scalar> v;  ///< [m s^-1] of the drift
-  Vector3<Scalar> a;  ///< [m s^-2]
-  Scalar h;           ///< [s]
+  Vector3<Scalar> r;       ///< [m] at the start
+  Vector3<Scalar> v;       ///< [m s^-1] of the drift
+  Vector3<Scalar> a;       ///< [m s^-2]
+  Scalar h;                ///< [s]
+  Scalar far = Scalar(0);  ///< [m] largest coordinate of the two, by which r is rounded
 
   Vector3<Scalar> place(const Scalar& t) const { return r + v * t - a * (t * (h - t) / Scalar(2)); }
   Vector3<Scalar> velocity(const Scalar& t) const { return v + a * (t - h / Scalar(2)); }
@@ -58,7 +59,7 @@ std::optional<Scalar> firstTouch(const Scalar& from, const Scalar& h, const Scal
     Scalar u(0);
     Scalar pull(0);
     at(t, gap, u, pull);
-    if (gap <= rounding) {
+    if (gap <= (stride == 0 ? Scalar(2) * rounding : rounding)) {  // so what was just closed is not open
       if (u > Scalar(0) || (u == Scalar(0) && pull > Scalar(0))) {
         return t;
       }
@@ -76,14 +77,25 @@ std::optional<Scalar> firstTouch(const Scalar& from, const Scalar& h, const Scal
   return std::nullopt;  // grazes within rounding
 }
 
+namespace detail {
+
+/// Of gaps [m]. Blows of one moment move bodies by t J/m each, which rounds their places: those that touch
+/// now must be seen to, wherever they are.
+template <Real Scalar>
+Scalar gapRounding(const RelativeFlight<Scalar>& flight, const Scalar& size) {
+  return Scalar(8) * Eigen::NumTraits<Scalar>::epsilon() * (size + flight.far / Scalar(2));
+}
+
+}  // namespace detail
+
 /// The first time in [from, h] at which two spheres touch and approach, |r(t)| <= reach.
 /// Since d2|r|/dt2 = a.r/|r| + v_t^2/|r| >= -|a|, a stride is never too long.
 template <Real Scalar>
 std::optional<Scalar> timeOfImpact(const RelativeFlight<Scalar>& flight, const Scalar& reach,
                                    const Scalar& from) {
   const Scalar pull = detail::safeNorm(flight.a);
-  const Scalar rounding = Scalar(8) * Eigen::NumTraits<Scalar>::epsilon() *
-                          (reach + detail::maxAbs(Vector3<Scalar>(flight.v * flight.h)));
+  const Scalar rounding = detail::gapRounding<Scalar>(
+      flight, Scalar(reach + detail::maxAbs(Vector3<Scalar>(flight.v * flight.h))));
   return firstTouch<Scalar>(
       from, flight.h, rounding, [&](const Scalar& t, Scalar& gap, Scalar& u, Scalar& bound) {
         const Vector3<Scalar> r = flight.place(t);
@@ -104,7 +116,7 @@ std::optional<Scalar> timeOfImpact(const RelativeFlight<Scalar>& flight, const V
   const Scalar a_n = normal.dot(flight.a);
   const Scalar& h = flight.h;
   const Scalar size = r_n < Scalar(0) ? Scalar(-r_n) : r_n;
-  const Scalar rounding = Scalar(8) * Eigen::NumTraits<Scalar>::epsilon() * (reach + size);
+  const Scalar rounding = detail::gapRounding<Scalar>(flight, Scalar(reach + size));
   return firstTouch<Scalar>(from, h, rounding, [&](const Scalar& t, Scalar& gap, Scalar& u, Scalar& bound) {
     gap = r_n - reach + v_n * t - a_n * (t * (h - t) / Scalar(2));
     u = -(v_n + a_n * (t - h / Scalar(2)));
