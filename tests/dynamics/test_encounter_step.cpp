@@ -506,3 +506,16 @@ TEST_CASE("Fixed bodies ask for no step of each other, and all the same of what 
 }
 
 }  // namespace test_encounter_step
+
+// Seen to fail: all were taken.
+TEST_CASE("Limits of steps out of range are refused, naming which") {
+  const Bodies<double> bodies;
+  const auto refuses = [&](const StepLimits<double>& limits, const char* what) {
+    CHECK_THROWS_WITH(stepFromEncounters(bodies, 1.0, 0.0, limits), ContainsSubstring(what));
+    CHECK_THROWS_WITH(stepFromMotion(bodies, 0.0, limits), ContainsSubstring(what));
+  };
+  refuses({.factor = 0.0}, "factor of steps is 0");
+  refuses({.smallest = std::nan("")}, "smallest step is nan");
+  refuses({.largest = 0.0}, "largest step is 0");
+  refuses({.contactSteps = -1.0}, "contact steps in a step is -1");
+}

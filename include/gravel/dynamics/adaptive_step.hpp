@@ -15,6 +15,7 @@
 /// bodies under forces whose law is not known; under mutual gravity see encounter_step.hpp.
 
 #include <gravel/bodies/bodies.hpp>
+#include <gravel/core/check.hpp>
 #include <gravel/core/parallel.hpp>
 #include <gravel/spatial/domain.hpp>
 
@@ -29,6 +30,15 @@ struct StepLimits {
   Scalar largest = Scalar(1);       ///< [s]
   Scalar contactSteps = Scalar(1);  ///< contact steps in one step: only these must be short against radii
 };
+
+/// \throws std::invalid_argument naming the limit, its value and what is allowed
+template <Real Scalar>
+void validate(const StepLimits<Scalar>& limits) {
+  detail::require("factor of steps", limits.factor, detail::positive<Scalar>());
+  detail::require("smallest step", limits.smallest, detail::nonNegative<Scalar>());
+  detail::require("largest step", limits.largest, detail::positive<Scalar>());
+  detail::require("contact steps in a step", limits.contactSteps, detail::positive<Scalar>());
+}
 
 namespace detail {
 
@@ -60,12 +70,14 @@ struct FlowLeftOut {
 
 /// The step by the rules above over the movable bodies, within the limits. O(N).
 /// \param anchored something outside the bodies stands still, such as a plane
+/// \throws std::invalid_argument of validate()
 template <Real Scalar, class Layout>
 Scalar stepFromMotion(const Bodies<Scalar, Layout>& bodies, const Scalar& softening,
                       const StepLimits<Scalar>& limits, bool anchored = false,
                       const Domain<Scalar>& domain = {}) {
   using std::cbrt;
   using std::sqrt;
+  validate(limits);
   const std::size_t n = bodies.size();
   if (n == 0) {
     return limits.largest;

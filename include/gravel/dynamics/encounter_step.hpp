@@ -210,12 +210,14 @@ bool haveUnlikeMasses(const BodiesType& bodies) {
 ///        masses, and for any number no sphere moves by more than a quarter of its radius, the flow left out
 ///        as in adaptive_step.hpp
 /// \param time [s] for a domain that shears
+/// \throws std::invalid_argument of validate(limits)
 template <Real Scalar, class Layout>
 Scalar stepFromEncounters(const Bodies<Scalar, Layout>& bodies, const Scalar& G, const Scalar& softening,
                           const StepLimits<Scalar>& limits, const Domain<Scalar>& domain = {},
                           const Scalar& time = Scalar(0)) {
   using S = detail::RateScalar<Scalar>;
   using std::sqrt;
+  validate(limits);
   const S T = S(limits.largest) / S(limits.factor);
   S sum(0);
   S approach(0);
