@@ -215,6 +215,8 @@ TEST_CASE("validate lists every field at fault at once, with value and range") {
   config.integrator = static_cast<IntegratorKind>(77);
   config.gravity = static_cast<GravityKind>(78);
   config.broadPhase = static_cast<BroadPhaseKind>(79);
+  config.sleepSpeed = 1.0;  // what these may be hangs on the integrator
+  config.contactSubsteps = 2;
   std::string message;
   try {
     config.validate();

@@ -155,13 +155,14 @@ void SimulationConfig<Scalar>::validate() const {
   if (isFinite(minTimeStep) && isFinite(timeStep) && timeStep > Scalar(0) && minTimeStep > timeStep) {
     fault("minTimeStep", detail::formatReal(minTimeStep), "at most timeStep");
   }
-  if (contactSubsteps != 1 && integrator != IntegratorKind::VelocityVerlet &&
+  const bool known = static_cast<std::size_t>(integrator) < EnumNames<IntegratorKind>::values.size();
+  if (known && contactSubsteps != 1 && integrator != IntegratorKind::VelocityVerlet &&
       integrator != IntegratorKind::SymplecticEpicycle) {
     fault("contactSubsteps", std::to_string(contactSubsteps),
           std::string("1 with ") + traitsOf(integrator).name +
               "; others need one drift a step, VelocityVerlet or SymplecticEpicycle");
   }
-  if (sleepSpeed > Scalar(0) &&
+  if (known && sleepSpeed > Scalar(0) &&
       (!traitsOf(integrator).contacts || integrator == IntegratorKind::SymplecticEpicycle)) {
     fault("sleepSpeed", detail::formatReal(sleepSpeed),
           std::string("0 with ") + traitsOf(integrator).name +
