@@ -75,3 +75,24 @@ TEST_CASE(
   const RelativeFlight<double> late{{0, 0, 5.5}, {0, 0, -4.9}, {0, 0, 0}, h};
   CHECK(!timeOfImpact<double>(late, n, 0.5, 0.0));
 }
+
+// Seen to fail without a bound to what counts as closed (from 4096 radii on in single precision), and without
+// what places are rounded by.
+TEMPLATE_TEST_CASE("A gap within the rounding of places is closed, and none that counts as apart", "", float,
+                   double) {
+  using S = TestType;
+  const S apart = S(1) / S(1000);
+  for (const S far : {S(64), S(4096), S(1e9), S(1) / Eigen::NumTraits<S>::epsilon()}) {
+    for (const bool isWall : {false, true}) {
+      CAPTURE(far, isWall);
+      const auto touch = [&](const S& gap) {
+        const RelativeFlight<S> flight{
+            {S(0), S(0), S(1) + gap}, {S(0), S(0), S(-1)}, {S(0), S(0), S(0)}, S(1) / S(8), far};
+        return isWall ? timeOfImpact<S>(flight, Vector3<S>(S(0), S(0), S(1)), S(1), S(0))
+                      : timeOfImpact<S>(flight, S(1), S(0));
+      };
+      CHECK(touch(std::min<S>(S(4) * Eigen::NumTraits<S>::epsilon() * far, apart / S(8))) == S(0));
+      CHECK(touch(apart) > apart / S(2));
+    }
+  }
+}

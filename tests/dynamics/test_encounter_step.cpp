@@ -505,8 +505,6 @@ TEST_CASE("Fixed bodies ask for no step of each other, and all the same of what 
   CHECK_THAT(scene(true, true), WithinRel(scene(false, true) / std::pow(2.0, 0.125), 1e-3));
 }
 
-}  // namespace test_encounter_step
-
 // Seen to fail: all were taken.
 TEST_CASE("Limits of steps out of range are refused, naming which") {
   const Bodies<double> bodies;
@@ -519,3 +517,5 @@ TEST_CASE("Limits of steps out of range are refused, naming which") {
   refuses({.largest = 0.0}, "largest step is 0");
   refuses({.contactSteps = -1.0}, "contact steps in a step is -1");
 }
+
+}  // namespace test_encounter_step

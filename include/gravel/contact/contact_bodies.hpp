@@ -54,7 +54,7 @@ struct ContactArrays {
   /// Called where contacts are found and taken up. O(bodies).
   /// \throws std::invalid_argument unless all are of one length, masses and radii finite and >= 0, and
   /// inertia factors finite and > 0
-  void check() const {
+  void requireWhole() const {
     const auto require = [this](const char* what, std::size_t length) {
       if (length != size()) {
         detail::refuse(std::string("length of ") + what, std::to_string(length),
@@ -90,8 +90,8 @@ namespace detail {
 /// What can say whether it is whole does so.
 template <class B>
 void requireWhole(const B& bodies) {
-  if constexpr (requires { bodies.check(); }) {
-    bodies.check();
+  if constexpr (requires { bodies.requireWhole(); }) {
+    bodies.requireWhole();
   }
 }
 

@@ -35,6 +35,10 @@ class NarrowPhase {
             std::optional<std::span<const std::uint32_t>> nearBoundaries = std::nullopt) {
     detail::requireWhole(bodies);
     validate(settings);
+    if (!settings.carried.empty() && settings.carried.size() != bodies.size()) {
+      detail::refuse("length of what carries bodies", std::to_string(settings.carried.size()),
+                     "0, or the number of bodies, " + std::to_string(bodies.size()));
+    }
     walls_.find(bodies, materials, boundaries, settings, nearBoundaries);
     if (!pairs.empty()) {
       spheres_.resize(bodies.size());

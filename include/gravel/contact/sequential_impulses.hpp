@@ -63,6 +63,8 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     detail::giveBack(places_);
     if (colouring.islandsEnd() < problem.rows.size()) {
       sum += solveLarge(problem, colouring, settings);
+    } else {
+      momentum_.end();
     }
     report.iterations = sum.iterations;
     report.looks = sum.looks;
@@ -80,6 +82,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     const std::size_t first = colouring.islandsEnd();
     const std::size_t count = problem.rows.size() - first;
     if (!(problem.largestApproach > S(0))) {
+      momentum_.end();
       problem.release(colouring, first, problem.rows.size());
       return {};
     }

@@ -4,7 +4,9 @@
 /// When, inside a step, two spheres or a sphere and a plane come to touch.
 
 #include <gravel/contact/impulses.hpp>
+#include <gravel/contact/resting_gap.hpp>
 
+#include <algorithm>
 #include <optional>
 
 namespace gravel {
@@ -80,10 +82,13 @@ std::optional<Scalar> firstTouch(const Scalar& from, const Scalar& h, const Scal
 namespace detail {
 
 /// Of gaps [m]. Blows of one moment move bodies by t J/m each, which rounds their places: those that touch
-/// now must be seen to, wherever they are.
+/// now must be seen to, wherever they are. But what counts as apart (restingMargin()) never counts as closed.
+/// \param reach [m] sum of the radii  \param size [m] of what the gap is computed from
 template <Real Scalar>
-Scalar gapRounding(const RelativeFlight<Scalar>& flight, const Scalar& size) {
-  return Scalar(8) * Eigen::NumTraits<Scalar>::epsilon() * (size + flight.far / Scalar(2));
+Scalar gapRounding(const RelativeFlight<Scalar>& flight, const Scalar& reach, const Scalar& size) {
+  const Scalar ulps = Scalar(8) * Eigen::NumTraits<Scalar>::epsilon();
+  return ulps * size +
+         std::min<Scalar>(ulps * flight.far / Scalar(2), restingMargin<Scalar>() * reach / Scalar(8));
 }
 
 }  // namespace detail
@@ -95,7 +100,7 @@ std::optional<Scalar> timeOfImpact(const RelativeFlight<Scalar>& flight, const S
                                    const Scalar& from) {
   const Scalar pull = detail::safeNorm(flight.a);
   const Scalar rounding = detail::gapRounding<Scalar>(
-      flight, Scalar(reach + detail::maxAbs(Vector3<Scalar>(flight.v * flight.h))));
+      flight, reach, Scalar(reach + detail::maxAbs(Vector3<Scalar>(flight.v * flight.h))));
   return firstTouch<Scalar>(
       from, flight.h, rounding, [&](const Scalar& t, Scalar& gap, Scalar& u, Scalar& bound) {
         const Vector3<Scalar> r = flight.place(t);
@@ -116,7 +121,7 @@ std::optional<Scalar> timeOfImpact(const RelativeFlight<Scalar>& flight, const V
   const Scalar a_n = normal.dot(flight.a);
   const Scalar& h = flight.h;
   const Scalar size = r_n < Scalar(0) ? Scalar(-r_n) : r_n;
-  const Scalar rounding = detail::gapRounding<Scalar>(flight, Scalar(reach + size));
+  const Scalar rounding = detail::gapRounding<Scalar>(flight, reach, Scalar(reach + size));
   return firstTouch<Scalar>(from, h, rounding, [&](const Scalar& t, Scalar& gap, Scalar& u, Scalar& bound) {
     gap = r_n - reach + v_n * t - a_n * (t * (h - t) / Scalar(2));
     u = -(v_n + a_n * (t - h / Scalar(2)));

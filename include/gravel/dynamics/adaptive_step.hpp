@@ -20,6 +20,7 @@
 #include <gravel/spatial/domain.hpp>
 
 #include <algorithm>
+#include <type_traits>
 
 namespace gravel {
 

@@ -51,10 +51,10 @@ template <Real Scalar>
 class Epicycle {
  public:
   /// \param h [s] of either sign; long ones are cut, so that no turn is by more than one radian
-  /// \throws std::invalid_argument where that takes more than 1e9 of them
+  /// \throws std::invalid_argument of check()
   Epicycle(const HillFrame<Scalar>& frame, const Scalar& h) : frame_(frame) {
-    Scalar fastest = std::max<Scalar>(size(frame.omega * h), size(frame.vertical * h));
-    detail::require("turn of the frame in a step [rad]", fastest, {Scalar(0), Scalar(1e9), "at most 1e9"});
+    check(frame, h);
+    Scalar fastest = fastestTurn(frame, h);
     while (fastest > Scalar(1)) {
       fastest /= Scalar(2);
       parts_ *= 2;
@@ -62,6 +62,12 @@ class Epicycle {
     h_ = h / Scalar(static_cast<double>(parts_));
     plane_ = Shears(frame.omega, h_);
     normal_ = Shears(frame.vertical, h_);
+  }
+
+  /// A turn takes about as many parts as it has radians. \throws std::invalid_argument if that are too many
+  static void check(const HillFrame<Scalar>& frame, const Scalar& h) {
+    detail::require("turn of the frame in a step [rad]", fastestTurn(frame, h),
+                    {Scalar(0), Scalar(1e6), "at most 1e6"});
   }
 
   /// \param dx,dv what is to be added to x and v
@@ -103,6 +109,10 @@ class Epicycle {
   };
 
   static Scalar size(const Scalar& x) { return x < Scalar(0) ? Scalar(-x) : x; }
+  /// [rad]
+  static Scalar fastestTurn(const HillFrame<Scalar>& frame, const Scalar& h) {
+    return std::max<Scalar>(size(frame.omega * h), size(frame.vertical * h));
+  }
 
   void add(const Vector3<Scalar>& x, const Vector3<Scalar>& v, Vector3<Scalar>& dx,
            Vector3<Scalar>& dv) const {
@@ -162,9 +172,8 @@ void integrateEpicycle(const HillFrame<Scalar>& frame, Bodies<Scalar, Layout>& b
 }
 
 /// Brings bodies that left a periodic box back in through the other side. \return the energy that they have
-/// more there [J]: what the shear of a disc puts in, and a uniform field over the length of the box. Both are
-/// seen at the velocities that a last kick of the field leaves.
-/// \param kick [s] of that one
+/// more there [J]: what the shear of a disc puts in, at the velocity that a last kick of the field leaves,
+/// and a uniform field over the length of the box. \param kick [s] of the last one
 template <Real Scalar, class Layout>
 Scalar wrapBodies(Bodies<Scalar, Layout>& bodies, const Domain<Scalar>& domain, const Scalar& time,
                   const Vector3<Scalar>& field, const Scalar& kick) {
@@ -184,10 +193,10 @@ Scalar wrapBodies(Bodies<Scalar, Layout>& bodies, const Domain<Scalar>& domain, 
         continue;
       }
       bodies[i].position() = x;
-      bodies[i].velocity() = v;
       if (bodies[i].isFixed()) {
         continue;
       }
+      bodies[i].velocity() = v;
       gained -= Scalar(bodies[i].mass()) * field.dot(Vector3<Scalar>(x - x0));
       if (frame.turns()) {
         gained +=

@@ -6,6 +6,8 @@
 #include <gravel/gravity/direct_sum.hpp>
 #include <gravel/gravity/fast_multipole.hpp>
 
+#include <array>
+
 namespace gravel {
 
 /// `Automatic` takes the method that is expected to be cheaper for the number of bodies and the tolerance.

@@ -6,6 +6,8 @@
 #include <gravel/bodies/bodies.hpp>
 #include <gravel/core/parallel.hpp>
 
+#include <type_traits>
+
 namespace gravel {
 
 template <Real Scalar>

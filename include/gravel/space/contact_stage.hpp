@@ -48,7 +48,7 @@ class ContactStage {
   std::size_t touches(const Bodies& bodies) const;
 
   /// Brings bodies back into the domain. \return the energy that they have more there [J]
-  /// \param field [m s^-2]  \param kick [s] for which it still acts at the end of the step
+  /// \param field [m s^-2]  \param kick [s] for which it still acts at the end of the part
   Scalar wrap(Bodies& bodies, const Scalar& time, const Vector3<Scalar>& field, const Scalar& kick) const {
     return wrapBodies(bodies, domain, time, field, kick);
   }

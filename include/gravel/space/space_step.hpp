@@ -82,6 +82,9 @@ std::pair<Scalar, Scalar> Space<Scalar, Layout>::timeAfter(const Scalar& h) cons
 ///   whole ones are left before that time
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration, const Scalar* until) {
+  if (const HillFrame<Scalar> frame(contact_.domain); frame.turns()) {
+    Epicycle<Scalar>::check(frame, h);
+  }
   Profiler::Step timing(profiler_);
   std::size_t more = 0;
   if (!bodies_.empty()) {

@@ -39,7 +39,7 @@ class KDTree {
 
   /// Calls visit(index, squared distance) for each point with distance < radius, in no promised order.
   /// Safe from several threads at once. O(log N + hits); O(N) where the square of the radius leaves the range
-  /// of numbers, since the tree is searched by squares.
+  /// of numbers, since the tree is searched by squares, and those handed on are 0 or infinite there.
   template <class Visitor>
   void forEachWithin(const Vector3<S>& q, S radius, Visitor&& visit) const {
     if (size() == 0 || !(radius > S(0))) {
@@ -48,14 +48,14 @@ class KDTree {
     const std::vector<Vector3<S>>& points = tree_->cloud.points;
     const detail::Within<S> isWithin(radius);
     const bool cuts = isWithin.bySquares() && detail::Within<Cut>(static_cast<Cut>(radius)).bySquares();
-    for (std::size_t i = 0; i < points.size() && !cuts; ++i) {
-      const Vector3<S> d = points[i] - q;
-      const S distance_sq = d.squaredNorm();
-      if (isWithin(d, distance_sq)) {
-        visit(i, distance_sq);
-      }
-    }
     if (!cuts) {
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        const Vector3<S> d = points[i] - q;
+        const S distance_sq = d.squaredNorm();
+        if (isWithin(d, distance_sq)) {
+          visit(i, distance_sq);
+        }
+      }
       return;
     }
     Ball<std::remove_reference_t<Visitor>> ball{points, q, radius * radius, Cut(0), visit};
