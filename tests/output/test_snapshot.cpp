@@ -60,6 +60,20 @@ bool sameBits(const A& a, const B& b) {
   return same;
 }
 
+/// A file whose checksum fits, with the head of a record of so many doubles and nothing after it.
+std::vector<char> headOfRecord(const std::string& name, std::uint64_t doubles) {
+  std::vector<unsigned char> bytes(detail::snapshotMagic,
+                                   detail::snapshotMagic + sizeof detail::snapshotMagic - 1);
+  const std::uint64_t head[3] = {name.size(), sizeof(double), doubles};
+  const auto* first = reinterpret_cast<const unsigned char*>(head);
+  bytes.insert(bytes.end(), first, first + sizeof head);
+  bytes.insert(bytes.end(), name.begin(), name.end());
+  const std::uint64_t sum = detail::fnv1a(detail::fnvStart, bytes.data(), bytes.size());
+  const auto* tail = reinterpret_cast<const unsigned char*>(&sum);
+  bytes.insert(bytes.end(), tail, tail + sizeof sum);
+  return {bytes.begin(), bytes.end()};
+}
+
 }  // namespace
 
 TEMPLATE_TEST_CASE("Bodies come back from a file with every bit of every field", "", (std::pair<float, SoA>),
@@ -150,36 +164,16 @@ TEST_CASE("Every damaged bit and every missing end of a file is found") {
 }
 
 TEST_CASE("A record that claims to be longer than the file is refused, without memory being asked for") {
-  // A well-formed file whose checksum fits, with a length field of 2^61 doubles.
-  std::vector<unsigned char> bytes(detail::snapshotMagic,
-                                   detail::snapshotMagic + sizeof detail::snapshotMagic - 1);
-  const std::uint64_t head[3] = {1, sizeof(double), std::uint64_t{1} << 61U};
-  const auto* first = reinterpret_cast<const unsigned char*>(head);
-  bytes.insert(bytes.end(), first, first + sizeof head);
-  bytes.push_back('x');
-  const std::uint64_t sum = detail::fnv1a(detail::fnvStart, bytes.data(), bytes.size());
-  const auto* tail = reinterpret_cast<const unsigned char*>(&sum);
-  bytes.insert(bytes.end(), tail, tail + sizeof sum);
   const TemporaryFile file("long");
-  file.put(std::vector<char>(bytes.begin(), bytes.end()));
+  file.put(headOfRecord("x", std::uint64_t{1} << 61U));
   SnapshotReader in(file.path());
   CHECK_THROWS_AS(in.array<double>("x"), std::runtime_error);
 }
 
 // Seen to fail: the bytes themselves stood in the message.
 TEST_CASE("A record whose name is no text is told in characters that can be shown") {
-  std::vector<unsigned char> bytes(detail::snapshotMagic,
-                                   detail::snapshotMagic + sizeof detail::snapshotMagic - 1);
-  const std::string name = "a\n\033[2J\xff" + std::string(100, 'b');
-  const std::uint64_t head[3] = {name.size(), sizeof(double), 0};
-  const auto* first = reinterpret_cast<const unsigned char*>(head);
-  bytes.insert(bytes.end(), first, first + sizeof head);
-  bytes.insert(bytes.end(), name.begin(), name.end());
-  const std::uint64_t sum = detail::fnv1a(detail::fnvStart, bytes.data(), bytes.size());
-  const auto* tail = reinterpret_cast<const unsigned char*>(&sum);
-  bytes.insert(bytes.end(), tail, tail + sizeof sum);
   const TemporaryFile file("name");
-  file.put(std::vector<char>(bytes.begin(), bytes.end()));
+  file.put(headOfRecord("a\n\033[2J\xff" + std::string(100, 'b'), 0));
   SnapshotReader in(file.path());
   CHECK_THROWS_WITH(in.array<double>("x"),
                     ContainsSubstring("holds 'a??[2J?" + std::string(33, 'b') + "...' of"));

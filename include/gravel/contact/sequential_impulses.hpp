@@ -63,9 +63,8 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     detail::giveBack(places_);
     if (colouring.islandsEnd() < problem.rows.size()) {
       sum += solveLarge(problem, colouring, settings);
-    } else {
-      momentum_.end();
     }
+    momentum_.end();
     report.iterations = sum.iterations;
     report.looks = sum.looks;
     report.residual = sum.residual;
@@ -82,7 +81,6 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     const std::size_t first = colouring.islandsEnd();
     const std::size_t count = problem.rows.size() - first;
     if (!(problem.largestApproach > S(0))) {
-      momentum_.end();
       problem.release(colouring, first, problem.rows.size());
       return {};
     }
@@ -94,7 +92,6 @@ class SequentialImpulses : private detail::RowImpulses<S> {
     if (problem.again && !(problem.wrong_sq > right * right)) {
       problem.kept = problem.passes;
       problem.watch.setHolds(problem.passes);
-      momentum_.end();
       // One that would change nothing.
       return {1, problem.looks, S(sqrt(problem.wrong_sq) / problem.largestApproach)};
     }
@@ -116,7 +113,6 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       const bool more = course.take(now) && problem.letSlide(colouring, course.slides());
       if (!course.goesOn(more)) {
         problem.watch.setHolds(watched && course.isRight());
-        momentum_.end();
         return {course.sweeps(), looks, S(course.change() / problem.largestApproach)};
       }
       local = local || (course.sweeps() == 1 && now.changed < count / few);

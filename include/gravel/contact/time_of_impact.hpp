@@ -51,7 +51,7 @@ Scalar timeToClose(const Scalar& gap, const Scalar& u, const Scalar& pull) {
 /// `at(t, gap, u, pull)` gives the gap [m] at t, the speed u [m s^-1] at which it shrinks, and an upper bound
 /// of du/dt [m s^-2] for the rest of the step. Each stride ends where the gap could be closed at the
 /// earliest, so that no touch is missed; strides shrink quadratically. \param rounding [m] of gaps: closed
-/// means no more than that
+/// means no more than that, or than twice that at `from`
 template <Real Scalar, class At>
 std::optional<Scalar> firstTouch(const Scalar& from, const Scalar& h, const Scalar& rounding, At&& at) {
   constexpr int mostStrides = 64;  // a graze converges linearly, one bit a stride

@@ -24,6 +24,10 @@ using std::sqrt;
 template <class T>
 auto rootOf(const T& x) -> decltype(T(sqrt(x)));
 
+/// For what is beyond a float's range, or digits: sums of momenta, powers of rates, expansions.
+template <class S>
+using AtLeastDouble = std::conditional_t<std::is_same_v<S, float>, double, S>;
+
 }  // namespace detail
 
 /// A scalar that gravel can compute with: float, double, long double, and any type with the arithmetic,

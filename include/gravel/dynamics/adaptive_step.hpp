@@ -20,7 +20,6 @@
 #include <gravel/spatial/domain.hpp>
 
 #include <algorithm>
-#include <type_traits>
 
 namespace gravel {
 
@@ -42,10 +41,6 @@ void validate(const StepLimits<Scalar>& limits) {
 }
 
 namespace detail {
-
-/// 8th powers of rates, and the momentum of a thousand suns, are beyond a float's range.
-template <Real Scalar>
-using RateScalar = std::conditional_t<std::is_same_v<Scalar, float>, double, Scalar>;
 
 /// What steps leave out of speeds: the flow of a sheared domain, unless a body stands still.
 template <Real Scalar>
@@ -83,7 +78,7 @@ Scalar stepFromMotion(const Bodies<Scalar, Layout>& bodies, const Scalar& soften
   if (n == 0) {
     return limits.largest;
   }
-  using Sum = detail::RateScalar<Scalar>;
+  using Sum = detail::AtLeastDouble<Scalar>;  // the momentum of a thousand suns is no float
   Sum mass(0);
   Vector3<Sum> v_sum = Vector3<Sum>::Zero();
   Vector3<Sum> a_sum = Vector3<Sum>::Zero();

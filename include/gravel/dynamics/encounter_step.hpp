@@ -215,7 +215,7 @@ template <Real Scalar, class Layout>
 Scalar stepFromEncounters(const Bodies<Scalar, Layout>& bodies, const Scalar& G, const Scalar& softening,
                           const StepLimits<Scalar>& limits, const Domain<Scalar>& domain = {},
                           const Scalar& time = Scalar(0)) {
-  using S = detail::RateScalar<Scalar>;
+  using S = detail::AtLeastDouble<Scalar>;  // of 8th powers
   using std::sqrt;
   validate(limits);
   const S T = S(limits.largest) / S(limits.factor);

@@ -30,7 +30,7 @@ class DirectRows {
 
  protected:
   /// Of expansions; see FastMultipole.
-  using F = std::conditional_t<std::is_same_v<S, float>, double, S>;
+  using F = AtLeastDouble<S>;
 
   static constexpr std::size_t width = PairTable<S>::width;
   static constexpr std::size_t filling = std::numeric_limits<std::size_t>::max();

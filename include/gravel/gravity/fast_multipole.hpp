@@ -103,7 +103,7 @@ class FastMultipole {
 
  private:
   /// Expansions of float bodies are in double: their coefficients are out of float's range.
-  using F = std::conditional_t<std::is_same_v<S, float>, double, S>;
+  using F = detail::AtLeastDouble<S>;
 
   static constexpr std::uint32_t leafSize = 64;
   static constexpr std::size_t mostBodies = std::numeric_limits<std::uint32_t>::max();

@@ -38,7 +38,8 @@ void requireFewImages(const Domain<S>& domain, const S& G) {
 template <Real S, Real F>
 class PeriodicImages {
  public:
-  /// \param time [s] for a domain that shears \throws std::invalid_argument of requireFewImages()
+  /// \param time [s] for a domain that shears \throws std::invalid_argument unless finite, or of
+  /// requireFewImages()
   void setDomain(const Domain<S>& domain, const S& time) {
     requireFewImages(domain, S(1));
     require("time of a domain", time, anyFinite<S>());
@@ -46,6 +47,7 @@ class PeriodicImages {
     time_ = time;
   }
   const Domain<S>& domain() const { return domain_; }
+
   bool isOpen() const { return domain_.isOpen(); }
   bool isPlane() const { return domain_.kind() == DomainKind::ShearPeriodic; }
 

@@ -6,8 +6,6 @@
 #include <gravel/bodies/bodies.hpp>
 #include <gravel/core/parallel.hpp>
 
-#include <type_traits>
-
 namespace gravel {
 
 template <Real Scalar>
@@ -21,8 +19,7 @@ struct ConservedQuantities {
 /// O(N); the same bits for any number of threads.
 template <Real Scalar, class Layout>
 ConservedQuantities<Scalar> conservedQuantities(const Bodies<Scalar, Layout>& bodies) {
-  // The mass of a planet times its place is beyond a float's range.
-  using Wide = std::conditional_t<std::is_same_v<Scalar, float>, double, Scalar>;
+  using Wide = detail::AtLeastDouble<Scalar>;  // the mass of a planet times its place is no float
   using Sum = Eigen::Array<Wide, 10, 1>;
   const Sum sum = orderedSum(bodies.size(), 1024, Sum(Sum::Zero()), [&](std::size_t begin, std::size_t end) {
     Sum part = Sum::Zero();

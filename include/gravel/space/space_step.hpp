@@ -82,7 +82,7 @@ std::pair<Scalar, Scalar> Space<Scalar, Layout>::timeAfter(const Scalar& h) cons
 ///   whole ones are left before that time
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration, const Scalar* until) {
-  if (const HillFrame<Scalar> frame(contact_.domain); frame.turns()) {
+  if (const HillFrame<Scalar> frame(contact_.domain); frame.turns()) {  // while nothing has changed yet
     Epicycle<Scalar>::check(frame, h);
   }
   Profiler::Step timing(profiler_);
