@@ -47,7 +47,6 @@ class PeriodicImages {
     time_ = time;
   }
   const Domain<S>& domain() const { return domain_; }
-
   bool isOpen() const { return domain_.isOpen(); }
   bool isPlane() const { return domain_.kind() == DomainKind::ShearPeriodic; }
 
