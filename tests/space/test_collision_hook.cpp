@@ -320,6 +320,31 @@ TEST_CASE(
 
 // Seen to fail: two about which the hook had decided took no notice of each other for the rest of the step,
 // and the light ball flew through the heavy one (35 blows in all, at a hundredth of a second).
+// Seen to fail: asked twice where the blow is in the second part, and left at a quarter of the speed.
+TEST_CASE("Who goes on approaching by a hook's velocities is asked once, however many parts the step has") {
+  for (const std::size_t parts : {1, 2, 3}) {
+    for (const double apart : {0.51, 0.57}) {  // met after 0.01 and 0.07 of 0.1 s
+      SimulationConfig<double> config = plain(0.1);
+      config.coeffRestitution = 1;
+      config.contactSubsteps = parts;
+      Space<double> space(config);
+      space.addBody(ball({-apart, 0, 0}, {1, 0, 0}, 0.5));
+      space.addBody(ball({apart, 0, 0}, {-1, 0, 0}, 0.5));
+      int calls = 0;
+      space.setCollisionHook([&](const Hit& hit) {
+        ++calls;
+        return Outcome::velocities(hit.first.velocity / 2, {0, 0, 0}, hit.second.velocity / 2, {0, 0, 0});
+      });
+      space.computeDynamics(0);
+      CAPTURE(parts, apart);
+      CHECK(calls == 1);
+      CHECK(Vec(space.body(0).velocity()) == Vec(-0.5, 0, 0));  // and bounce as the material says
+      CHECK(Vec(space.body(1).velocity()) == Vec(0.5, 0, 0));
+      CHECK_THAT(space.energyLedger().restitution, WithinRel(0.75, 1e-14));
+    }
+  }
+}
+
 TEST_CASE("Who parts with velocities of the user's own and is driven back in the same step meets again") {
   const auto elastic = [](const Hit& hit) {
     const double m1 = hit.first.mass;

@@ -75,6 +75,7 @@ class ContactStage {
 
   /// Pairs of ids that a user lets merge after impacts inside the last part of the step.
   const std::vector<std::pair<std::uint64_t, std::uint64_t>>& merges() const { return impacts_.merges(); }
+  const std::vector<Impact<Scalar>>& impactsOfPart() const { return impacts_.impacts(); }
 
   /// All that touched: contacts() with impulses(), and after them impacts().
   struct Touches {

@@ -23,7 +23,7 @@ auto Space<Scalar, Layout>::decideCollisions(const Scalar& time) -> std::vector<
   for (const auto& [id1, id2] : decided) {
     merges.emplace_back(BodyId{id1}, BodyId{id2});
   }
-  for (const Impact<Scalar>& impact : impacts()) {
+  for (const Impact<Scalar>& impact : contact_.impactsOfPart()) {
     if (impact.decided && impact.rests) {
       decided.emplace_back(impact.key1, impact.key2);
     }
