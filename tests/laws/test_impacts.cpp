@@ -583,3 +583,117 @@ TEST_CASE("In a uniform field a bounce off a fixed ball is exact, whatever the s
     CHECK((Vec(space.body(1).velocity()) - expected).norm() < 1e-12);
   }
 }
+
+// The way of the drift is none, but the path bends by 0.19 radii. Seen to fail: lists of neighbours that knew
+// ways alone did not name the ceiling, and the ball went 0.19 radii into it.
+TEST_CASE("A ball that turns back within a step strikes the ceiling that it reaches in it") {
+  const double g = 9.8, h = 0.02, radius = 1e-3, gap = 0.3 * radius, up = g * h / 2;
+  const double u = std::sqrt(up * up - 2 * g * gap);  // of the blow
+  const double rest = h - (up - u) / g;
+  for (const bool plane : {true, false}) {
+    for (const IntegratorKind kind : {IntegratorKind::VelocityVerlet, IntegratorKind::Yoshida4}) {
+      for (const std::size_t others : {0, 200}) {
+        SimulationConfig<double> config = plain(h);
+        config.coeffRestitution = 1;
+        config.integrator = kind;
+        Space<double> space(config);
+        space.setUniformField({0, 0, -g});
+        space.addBody(ball({0, 0, 0}, {0, 0, up}, radius));
+        if (plane) {
+          space.addPlane({0, 0, -1}, -radius - gap);
+        } else {
+          Body<double> above = ball({0, 0, 2 * radius + gap}, {0, 0, 0}, radius);
+          above.fixed = true;
+          space.addBody(above);
+        }
+        for (std::size_t i = 1; i <= others; ++i) {  // that stand
+          Body<double> far = ball({1.0 * static_cast<double>(i), 0, -1}, {0, 0, 0}, radius);
+          far.fixed = true;
+          space.addBody(far);
+        }
+        space.computeDynamics(0);
+        CAPTURE(plane, kind, others);
+        CHECK(space.impacts().size() == 1);
+        CHECK_THAT(space.body(0).position()[2], WithinAbs(gap - u * rest - g * rest * rest / 2, 1e-15));
+        CHECK_THAT(space.body(0).velocity()[2], WithinAbs(-u - g * rest, 1e-13));
+      }
+    }
+  }
+}
+
+// A blow late in a step puts the place from which a body would have come that way far from where it is. Seen
+// to fail: the image nearest to that place was looked at, and the two went through each other.
+TEST_CASE("In a periodic box what a blow sends back meets the image that is beside it") {
+  SimulationConfig<double> config = plain(1.0);
+  config.coeffRestitution = 1;
+  for (const double turn : {0.0, 1.0}) {  // along x and along y
+    for (const auto& domain : {Domain<double>::open(), Domain<double>::periodic({10, 10, 10}),
+                               Domain<double>::shearPeriodic({10, 10, 10}, 1e-9)}) {
+      config.integrator =
+          domain.omega() > 0 ? IntegratorKind::SymplecticEpicycle : IntegratorKind::VelocityVerlet;
+      Space<double> space(config);
+      space.setDomain(domain);
+      const Vec n = turn > 0 ? Vec(0, 1, 0) : Vec(1, 0, 0);
+      space.addBody(ball(0 * n, 4 * n, 0.4));
+      space.addBody(ball(-n, 4 * n, 0.4));
+      Body<double> wall = ball(4 * n, {0, 0, 0}, 0.4);
+      wall.fixed = true;
+      space.addBody(wall);
+      space.computeDynamics(0);
+      CAPTURE(turn, domain.kind());
+      // The first is back at 0.8 s, meets the second at 0.825 s, and the wall at 0.85 s.
+      CHECK(space.impacts().size() == 3);
+      const double exact = domain.omega() > 0 ? 1e-7 : 1e-13;
+      CHECK((Vec(space.body(0).position()) - 2.6 * n).norm() < exact);
+      CHECK((Vec(space.body(1).position()) - 1.6 * n).norm() < exact);
+      CHECK((Vec(space.body(0).velocity()) + 4 * n).norm() < exact);
+      CHECK((Vec(space.body(1).velocity()) + 4 * n).norm() < exact);
+    }
+  }
+}
+
+// Nothing was near its way before the blow. Seen to fail: looked for about the image nearest to where it
+// would have begun its new way, 4.1 of 8 m from the ball that it meets.
+TEST_CASE("In a periodic box what is thrown off its way meets a ball that was not near it") {
+  SimulationConfig<double> config = plain(1.0);
+  config.coeffRestitution = 1;
+  Space<double> space(config);
+  space.setDomain(Domain<double>::periodic({8, 8, 8}));
+  const double v = 3.3, t = 0.9, aside = 1.1;
+  const Vec turns(v * t, 0, 0);
+  space.addBody(ball({0, 0, 0}, {v, 0, 0}, 0.4));
+  space.addBody(ball(turns + Vec(0, aside, 0), {0, 0, 0}, 0.4));
+  Body<double> fixed = ball(turns + 0.8 * Vec(1, -1, 0).normalized(), {0, 0, 0}, 0.4);
+  fixed.fixed = true;
+  space.addBody(fixed);
+  for (int k = 0; k < 144; ++k) {  // so many that one swift body is compared with all
+    fixed.position = Vec(0.6 * (k % 12) - 3.5, 0.6 * (k / 12) - 3.5, 3.5);
+    space.addBody(fixed);
+  }
+  space.computeDynamics(0);
+  CHECK(space.impacts().size() == 2);
+  const double after = 1 - t - (aside - 0.8) / v;  // of the blow that drives the ball on
+  CHECK((Vec(space.body(0).position()) - turns - Vec(0, aside - 0.8, 0)).norm() < 1e-14);
+  CHECK((Vec(space.body(1).position()) - turns - Vec(0, aside + v * after, 0)).norm() < 1e-14);
+}
+
+// Seen to fail: an approach below 16 roundings of the whole speed got no blow, nor was what then overlapped
+// looked for.
+TEST_CASE("Two that fly side by side, however fast, and drift together do not pass through each other") {
+  for (const auto& [along, fast, slow, gap] :
+       {std::tuple{Vec(0, 1, 0), 1e13, 1e-2, 1e-2}, std::tuple{Vec(0.6, 0.8, 0), 1e11, 1e-4, 1e-4}}) {
+    SimulationConfig<double> config = plain(0.05);
+    config.coeffRestitution = 1;
+    Space<double> space(config);
+    space.addBody(ball({-0.5 - gap / 2, 0, 0}, fast * along + Vec(slow, 0, 0), 0.5));
+    space.addBody(ball({0.5 + gap / 2, 0, 0}, fast * along - Vec(slow, 0, 0), 0.5));
+    double least = 2;
+    for (int k = 0; k < 40; ++k) {
+      space.computeDynamics(0);
+      least = std::min(least, Vec(space.body(1).position() - space.body(0).position()).norm());
+    }
+    CAPTURE(fast);
+    CHECK(least > 1 - 2 * slow * config.timeStep - 1e-15 * fast * space.time());
+    CHECK(Vec(space.body(1).velocity() - space.body(0).velocity())[0] > 0);
+  }
+}

@@ -189,7 +189,6 @@ class ContactSolver {
         });
   }
   const ContactColoring& coloring() const { return coloring_; }
-
   /// What the last solve() did to the velocity of a body [m s^-1], and to its spin [rad/s].
   Vector3<S> changeOf(std::uint32_t body) const {
     return goesOn_ ? problem_.changeOf(coloring_.slotOf(body)) : Vector3<S>(Vector3<S>::Zero());
@@ -202,6 +201,7 @@ class ContactSolver {
   bool knows(std::uint32_t body) const { return coloring_.slotOf(body) != coloring_.staticSlot(); }
   /// Against what [m s^-2] these hold it, at the last solve(); 0 of what they do not move.
   const S& fallOf(std::uint32_t body) const { return problem_.fallOf(coloring_.slotOf(body)); }
+  const S& mostFall() const { return problem_.mostFall(); }  ///< of all
 
   /// Those of the solve before the last begin() that it was not given any more, in the order of their keys.
   const std::vector<detail::EndedContact<S>>& ended() const { return ended_; }

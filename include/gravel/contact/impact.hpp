@@ -70,6 +70,7 @@ template <Real Scalar>
 struct ImpactReport {
   std::size_t impacts = 0;
   std::size_t postponed = 0;  ///< bodies that reached `mostPerBody`
+  std::size_t grazes = 0;     ///< touches that approach by no more than rounding: no blow is dealt
   Scalar restitutionLoss = Scalar(0);
   Scalar frictionLoss = Scalar(0);
   Scalar driftWork = Scalar(0);
@@ -153,6 +154,13 @@ Vector3<S> spinByTorque(const B& bodies, std::size_t i, const S& t, const S& h) 
   } else {
     return Vector3<S>::Zero();
   }
+}
+
+/// [m s^-1] Rounding of speeds along n: what common motion, and what motion across n, brings into it.
+template <Real S>
+S noiseAlong(const Vector3<S>& n, const Vector3<S>& v1, const Vector3<S>& v2, const Vector3<S>& v_rel) {
+  return S(16) * Eigen::NumTraits<S>::epsilon() *
+         (sumAbs(Vector3<S>(n.cwiseProduct(v1))) + sumAbs(Vector3<S>(n.cwiseProduct(v2))) + maxAbs(v_rel));
 }
 
 /// An impact to come; void if a body has been through another one since.

@@ -56,7 +56,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
   /// Between the kick and the drift: changes positions, velocities and spins so that the drift ends where the
   /// bodies are after all impacts.
   /// \param near  `pairs()`: all that may touch in the step, sorted by ids; `version()`: changes with them, 0
-  ///   if unknown; `follow(bodies, i, h, out)`: appends those that a new course of body i adds
+  ///   if unknown; `follow(bodies, i, t, out)`: appends those that a new course of body i adds from t on
   /// \param held  contacts that are solved otherwise, sorted by keys
   /// \param nearWalls  indices of the bodies that may touch a boundary in the step; all without it
   /// \param decide  `decide(impact, material, v1, v2, v_rel)`, asked about each impact of two bodies that is
@@ -87,7 +87,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     S now(0);
     const auto goOn = [&](std::initializer_list<std::uint32_t> struck) {
       for (const std::uint32_t i : struck) {
-        near.follow(bodies, i, settings.h, late_);
+        near.follow(bodies, i, now, late_);
         swept_.renew(scene, i, settings.h);
         flights_.renew(scene, i);
       }
@@ -170,12 +170,11 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     }
     const detail::ImpactFlight<S> first = flights_.of(scene, event.first);
     const detail::ImpactFlight<S> second = flights_.of(scene, event.second);
-    const RelativeFlight<S> flight = flightOf(scene, first, second, at.drift);
+    const RelativeFlight<S> flight = flightOf(scene, first, second, event.t, at.drift);
     const S& r1 = first.radius;
     const S& r2 = second.radius;
-    // The normal on the straight way of the drift, a h^2/8 at most from the parabola's: the blow then exerts
-    // no torque on the drift's own positions, and keeps its angular momentum to rounding.
-    // Of one that cannot move there is none to keep.
+    // On the straight way of the drift, a h^2/8 at most from the parabola's: so the blow exerts no torque on
+    // the drift's own positions, and keeps angular momentum to rounding. What cannot move has none to keep.
     const bool anchored = !detail::isMovable(bodies, event.first) || !detail::isMovable(bodies, event.second);
     const auto touch =
         sphereSphere<S>(anchored ? flight.place(event.t) : Vector3<S>(flight.r + flight.v * event.t), r1, r2,
@@ -251,11 +250,12 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     const Vector3<S> v_rel = two.v - one.v + drift;
     const S v_n = n.dot(v_rel);
     const S pull = Base::fallsBack(a_n, boundary ? S(0) : distance, Vector3<S>(v_rel - v_n * n));
-    const S noise = S(16) * Eigen::NumTraits<S>::epsilon() * (detail::maxAbs(one.v) + detail::maxAbs(two.v));
+    const S noise = detail::noiseAlong<S>(n, one.v, two.v, v_rel);
     const bool still = !(v_n + lead < -noise);
     // Lands at the end of the step, also on a wall that is to come on faster, by its mean.
     const S hop = pull * (h - t) / S(2) + std::max<S>(S(0), S(-lead));
     if (still && (!(pull > S(0)) || !(hop - v_n > noise))) {
+      report.grazes += v_n + lead < S(0) ? 1U : 0U;
       return false;  // nothing presses them together, or they leave already, as fast as they would
     }
     const S speed = v_n < S(0) ? S(-v_n) : S(0);

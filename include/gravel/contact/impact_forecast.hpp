@@ -51,13 +51,13 @@ class ImpactForecast : protected ImpactPast<S> {
 
   static constexpr std::size_t chunk = 1024;
 
-  /// \param drift out: [m s^-1] of the image of the second, which the velocity includes
+  /// Of the image that is nearest at t. \param drift out: [m s^-1] of it, which the velocity includes
   template <class Scene>
-  static RelativeFlight<S> flightOf(const Scene& scene, const Flight& one, const Flight& two,
+  static RelativeFlight<S> flightOf(const Scene& scene, const Flight& one, const Flight& two, const S& t,
                                     Vector3<S>& drift) {
-    Vector3<S> r = two.x - one.x;
     drift = Vector3<S>::Zero();
-    scene.domain.minimumImage(r, drift, scene.settings.time);
+    const Vector3<S> r = scene.domain.imageAt(Vector3<S>(two.x - one.x), Vector3<S>(t * (two.v - one.v)), t,
+                                              drift, scene.settings.time);
     return relativeFlight(one, two, r, drift, scene.settings.h);
   }
   template <class Scene>
@@ -209,7 +209,8 @@ class ImpactForecast : protected ImpactPast<S> {
   [[gnu::flatten]] void predict(const Scene& scene, const Pair& pair, const S& from, std::size_t number) {
     const auto& [i, j] = pair;
     Vector3<S> r, drift;
-    if (!swept_.mayMeet(i, j, scene.domain, scene.settings.time, scene.settings.h, r, drift) ||
+    if ((scene.domain.isOpen() &&
+         !swept_.mayMeet(i, j, scene.domain, scene.settings.time, scene.settings.h, r, drift)) ||
         isLeftToSolver(scene, i) || isLeftToSolver(scene, j) || !detail::canTouch(scene.bodies, i, j)) {
       return;
     }
@@ -219,7 +220,7 @@ class ImpactForecast : protected ImpactPast<S> {
     }
     const Flight one = flights_.of(scene, i);
     const Flight two = flights_.of(scene, j);
-    const RelativeFlight<S> flight = relativeFlight(one, two, r, drift, scene.settings.h);
+    const RelativeFlight<S> flight = flightOf(scene, one, two, from, drift);
     const S reach = one.radius + two.radius;
     const bool held = isHeld(scene, i, j, keys, number);
     const Vector3<S> at = held ? flight.place(from) : flight.r;
@@ -261,7 +262,7 @@ class ImpactForecast : protected ImpactPast<S> {
       const Flight one = flights_.of(scene, i);
       const Flight two = flights_.of(scene, j);
       Vector3<S> drift;
-      const RelativeFlight<S> flight = flightOf(scene, one, two, drift);
+      const RelativeFlight<S> flight = flightOf(scene, one, two, from, drift);
       const Vector3<S> r = flight.place(from);
       const S reach = one.radius + two.radius;
       if (!(detail::safeNorm(r) <= reach * (S(1) + detail::restingMargin<S>()))) {

@@ -38,6 +38,7 @@ class ProblemBodies {
   /// [m s^-2] Against this contacts hold a body: its acceleration; where nothing stands still, less that of
   /// what hangs together with it, and where planes speed up, more that of these.
   const S& fallOf(std::uint32_t slot) const { return initial[slot].fall; }
+  const S& mostFall() const { return mostFall_; }
 
   /// What impulses did to the velocity of a body [m s^-1], and to its spin [rad/s].
   Vector3<S> changeOf(std::uint32_t slot) const {

@@ -255,6 +255,10 @@ class ContactStage {
   Scalar fastestSwing() const;
   void renewGeometry(const Bodies& bodies, const Config& config, const Scalar& time);
 
+  template <class Course, class Support>
+  struct Ways;
+  template <class Course, class Support>
+  struct WaysAfterBlows;
   template <class Course>
   void strike(Bodies& bodies, const Config& config, Course& course, const Scalar& time, const Scalar& h,
               const PartOfStep<Scalar>& part, Profiler& profiler);
@@ -286,6 +290,7 @@ class ContactStage {
   Scalar gapStep_ = Scalar(0);  // [s] of nextGapStep()
   mutable std::vector<ContactKeys> struck_;
   bool searched_ = false;  // neighbours_ hold for the whole drift
+  bool grazed_ = false;    // something touched in it, and got no blow
   ContactList<Scalar> contacts_;
   std::uint64_t revision_ = 0;  // of the bodies by whose indices contacts and impacts are
   mutable Present present_;

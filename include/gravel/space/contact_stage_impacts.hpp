@@ -8,6 +8,56 @@
 
 namespace gravel {
 
+/// How bodies go through a step of length h, for a NeighbourList.
+template <Real Scalar, class Layout>
+template <class Course, class Support>
+struct ContactStage<Scalar, Layout>::Ways {
+  const Bodies& bodies;
+  const Course& course;
+  const Support& support;
+  Scalar h;
+
+  Vector3<Scalar> operator()(std::size_t i) const {
+    return detail::isMovable(bodies, i) ? Vector3<Scalar>(course.velocity(bodies, i) * h)
+                                        : Vector3<Scalar>(Vector3<Scalar>::Zero());
+  }
+  Vector3<Scalar> bend(std::size_t i) const {
+    if (!detail::isMovable(bodies, i)) {
+      return Vector3<Scalar>::Zero();
+    }
+    Vector3<Scalar> a = course.acceleration(bodies, i);
+    if constexpr (!std::is_same_v<Support, NoSupport>) {
+      a += support(static_cast<std::uint32_t>(i));
+    }
+    return a * (h * h / Scalar(8));
+  }
+  Scalar mostBend(std::size_t i) const {
+    if (!detail::isMovable(bodies, i)) {
+      return Scalar(0);
+    }
+    Scalar a = detail::sumAbs(Vector3<Scalar>(course.acceleration(bodies, i)));
+    if constexpr (!std::is_same_v<Support, NoSupport>) {
+      a += support.most();
+    }
+    return a * (h * h / Scalar(8));
+  }
+};
+
+/// The same where blows may have lifted bodies off what holds them: the larger bends.
+template <Real Scalar, class Layout>
+template <class Course, class Support>
+struct ContactStage<Scalar, Layout>::WaysAfterBlows {
+  const Ways<Course, Support>& ways;
+
+  Vector3<Scalar> operator()(std::size_t i) const { return ways(i); }
+  Vector3<Scalar> bend(std::size_t i) const {
+    const Vector3<Scalar> held = ways.bend(i);
+    const Vector3<Scalar> lifted =
+        Ways<Course, NoSupport>{ways.bodies, ways.course, NoSupport{}, ways.h}.bend(i);
+    return lifted.squaredNorm() > held.squaredNorm() ? lifted : held;
+  }
+};
+
 template <Real Scalar, class Layout>
 bool ContactStage<Scalar, Layout>::foresees(const Bodies& bodies, const Config& config, const Scalar& time,
                                             const Scalar& h, Profiler& profiler) {
@@ -18,13 +68,8 @@ bool ContactStage<Scalar, Layout>::foresees(const Bodies& bodies, const Config& 
     return false;
   }
   const FlightFromStart<Scalar> course{h};
-  search(
-      bodies, config, time,
-      [&](std::size_t i) -> Vector3<Scalar> {
-        return detail::isMovable(bodies, i) ? Vector3<Scalar>(course.velocity(bodies, i) * h)
-                                            : Vector3<Scalar>(Vector3<Scalar>::Zero());
-      },
-      h, profiler);
+  search(bodies, config, time, Ways<FlightFromStart<Scalar>, NoSupport>{bodies, course, NoSupport{}, h}, h,
+         profiler);
   const Profiler::Scope scope(profiler, Phase::Impacts);
   prepareSurfaces(config);
   return impacts_.foresees(bodies, neighbours_.pairs(), domain, walls_, {time, h}, nearBoundaries(bodies, h),
@@ -55,28 +100,6 @@ template <class Course>
 void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, Course& course,
                                           const Scalar& time, const Scalar& h, const PartOfStep<Scalar>& part,
                                           Profiler& profiler) {
-  const auto way = [&](std::size_t i) -> Vector3<Scalar> {
-    return detail::isMovable(bodies, i) ? Vector3<Scalar>(course.velocity(bodies, i) * h)
-                                        : Vector3<Scalar>(Vector3<Scalar>::Zero());
-  };
-  search(bodies, config, time, way, h, profiler);
-  searched_ = true;
-  const Profiler::Scope scope(profiler, Phase::Impacts);
-  prepareSurfaces(config, part);
-  struct Near {
-    NeighbourList<Scalar>& list;
-    const decltype(way)& travel;
-    const std::vector<Pair>& pairs() const { return list.pairs(); }
-    std::uint64_t version() const { return list.version(); }
-    void follow(const Bodies& all, std::uint32_t i, const Scalar&, std::vector<Pair>& out) {
-      list.follow(i, all.positions(), detail::RestingReaches<Bodies>{all}, all.ids(), travel(i), travel, out);
-    }
-  } near{neighbours_, way};
-  const ImpactSettings<Scalar> settings{time, h, std::max(config.restitutionThreshold, config.epsilon),
-                                        config.epsilon};
-  const MaterialView<Scalar> surfaces = materials.view();
-  const std::span<const HalfSpace<Scalar>> walls(walls_);
-  const std::span<const ContactName> held = names();
   struct Support {
     const ContactSolver<Scalar>& solver;
     const Bodies& bodies;
@@ -96,7 +119,29 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
       const Vector3<Scalar> held = any(i);
       return detail::safeNorm(held) > Scalar(2) * fall(i) ? Vector3<Scalar>(Vector3<Scalar>::Zero()) : held;
     }
+    // Of any, along the axes in sum.
+    Scalar most() const { return none ? Scalar(0) : Scalar(Scalar(4) * solver.mostFall()); }
   } support{solver_, bodies, h, contacts_.empty()};
+  const Ways<Course, Support> ways{bodies, course, support, h};
+  search(bodies, config, time, ways, h, profiler);
+  searched_ = true;
+  const Profiler::Scope scope(profiler, Phase::Impacts);
+  prepareSurfaces(config, part);
+  struct Near {
+    NeighbourList<Scalar>& list;
+    const WaysAfterBlows<Course, Support> travel;
+    const std::vector<Pair>& pairs() const { return list.pairs(); }
+    std::uint64_t version() const { return list.version(); }
+    void follow(const Bodies& all, std::uint32_t i, const Scalar& t, std::vector<Pair>& out) {
+      list.follow(i, all.positions(), detail::RestingReaches<Bodies>{all}, all.ids(), travel(i), travel, out,
+                  t, Scalar(t / travel.ways.h));
+    }
+  } near{neighbours_, {ways}};
+  const ImpactSettings<Scalar> settings{time, h, std::max(config.restitutionThreshold, config.epsilon),
+                                        config.epsilon};
+  const MaterialView<Scalar> surfaces = materials.view();
+  const std::span<const HalfSpace<Scalar>> walls(walls_);
+  const std::span<const ContactName> held = names();
   ImpactReport<Scalar> blows;
   if (collisionHook) {
     const auto decide = [&](const Impact<Scalar>& impact, const Material<Scalar>& material,
@@ -137,6 +182,7 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
   }
   report_.impacts += blows.impacts;
   report_.postponed += blows.postponed;
+  grazed_ = blows.grazes > 0;
   report_.restitutionLoss += blows.restitutionLoss;
   report_.frictionLoss += blows.frictionLoss;
   report_.driftWork += blows.driftWork;

@@ -26,8 +26,8 @@ const char* ContactStage<Scalar, Layout>::reasonToSkip(const Bodies& bodies) con
 template <Real Scalar, class Layout>
 void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& config, const Scalar& time,
                                           const Scalar& h, bool goesOn, Profiler& profiler) {
-  const bool searched = searched_;
-  searched_ = false;
+  const bool searched = std::exchange(searched_, false);
+  const bool grazed = std::exchange(grazed_, false);
   if (revision_ != bodies.revision()) {
     std::erase_if(impacts(), [&](Impact<Scalar>& impact) { return !renumber(bodies, impact); });
     revision_ = bodies.revision();
@@ -56,7 +56,8 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
   settings.before = solver_.names();
   settings.carried = carried_;
   contactsChanged();
-  if (goesOn && searched && settings.resting->empty() && settings.settled.empty() && report_.postponed == 0) {
+  if (goesOn && searched && settings.resting->empty() && settings.settled.empty() && report_.postponed == 0 &&
+      !grazed) {
     contacts_.clear();
     profiler.skip(Phase::NarrowPhase, "all that met on the way parted again");
     return;

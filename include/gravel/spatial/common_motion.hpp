@@ -3,6 +3,7 @@
 /// \file
 /// What bodies have in common as they move: a pile in orbit is the same to look at as one at rest.
 
+#include <gravel/core/sizes.hpp>
 #include <gravel/core/types.hpp>
 
 #include <algorithm>
@@ -31,6 +32,34 @@ Vector3<S> wayOf(const Travel& travel, std::size_t i) {
   } else {
     return travel(i);
   }
+}
+
+/// How far [m] the middle of the path of body i is from that of its way: a h^2/8 on a parabola; zero where
+/// `travel` has no `bend(i)`.
+template <Real S, class Travel>
+Vector3<S> bendOf(const Travel& travel, std::size_t i) {
+  if constexpr (requires { travel.bend(i); }) {
+    return travel.bend(i);
+  } else {
+    return Vector3<S>::Zero();
+  }
+}
+
+/// No less than its length along each axis in sum, found sooner.
+template <Real S, class Travel>
+[[gnu::always_inline]] inline S mostBendOf(const Travel& travel, std::size_t i) {
+  if constexpr (requires { travel.mostBend(i); }) {
+    return travel.mostBend(i);
+  } else {
+    return sumAbs(bendOf<S>(travel, i));
+  }
+}
+
+/// (a + b)^2.
+template <Real S>
+[[gnu::always_inline]] inline S squareOfSum(const S& a_sq, const S& b_sq) {
+  using std::sqrt;
+  return b_sq > S(0) ? S(a_sq + b_sq + S(2) * S(sqrt(a_sq)) * S(sqrt(b_sq))) : a_sq;
 }
 
 /// What n ways have in common, as those of a pile in orbit do: the median of each component among at most 63
@@ -89,13 +118,29 @@ class CommonMotion {
     using std::sqrt;
     most_ = S(sqrt(std::max<S>(start_.squaredNorm(), end_.squaredNorm())));
   }
-  void clear() { set(Vector3<S>::Zero(), Vector3<S>::Zero()); }
+  /// That of n bodies. \param start, end  by body, before and after the ways \param travel  for bends
+  template <class Start, class End, class Travel>
+  void find(std::size_t n, const Start& start, const End& end, const Travel& travel) {
+    set(commonWay<S>(n, start), commonWay<S>(n, end));
+    bend_ = commonWay<S>(n, [&](std::size_t i) { return bendOf<S>(travel, i); });
+  }
+  /// Of ways that begin where all were last seen.
+  template <class Travel>
+  void findAhead(std::size_t n, const Travel& travel) {
+    find(
+        n, [](std::size_t /*body*/) { return Vector3<S>(Vector3<S>::Zero()); }, travel, travel);
+  }
+  void clear() {
+    set(Vector3<S>::Zero(), Vector3<S>::Zero());
+    bend_ = Vector3<S>::Zero();
+  }
 
   const Vector3<S>& start() const { return start_; }
   const Vector3<S>& end() const { return end_; }
+  const Vector3<S>& bend() const { return bend_; }
   /// [m] The longer of both.
   const S& most() const { return most_; }
-  bool isNone() const { return !(most_ > S(0)); }
+  bool isNone() const { return !(most_ > S(0)) && bend_ == Vector3<S>::Zero(); }
 
   /// A way from x as seen in this frame.
   Vector3<S> lessThis(const Vector3<S>& x, const Vector3<S>& way) const {
@@ -111,15 +156,23 @@ class CommonMotion {
     if constexpr (std::is_same_v<Travel, AtRest>) {
       return travel;
     } else {
-      return [this, &positions, &travel](std::size_t i) -> Vector3<S> {
-        return lessThis(Vector3<S>(positions[i]), Vector3<S>(travel(i)));
+      struct Rest {
+        const CommonMotion& common;
+        const Positions& positions;
+        const Travel& travel;
+        Vector3<S> operator()(std::size_t i) const {
+          return common.lessThis(Vector3<S>(positions[i]), Vector3<S>(travel(i)));
+        }
+        Vector3<S> bend(std::size_t i) const { return bendOf<S>(travel, i) - common.bend_; }
       };
+      return Rest{*this, positions, travel};
     }
   }
 
  private:
   Vector3<S> start_ = Vector3<S>::Zero();
   Vector3<S> end_ = Vector3<S>::Zero();
+  Vector3<S> bend_ = Vector3<S>::Zero();
   S most_ = S(0);
   S ahead_ = S(0);
 };

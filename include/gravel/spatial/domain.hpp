@@ -45,7 +45,8 @@ inline S nearestInteger(const S& x) {
 /// a box as well: what leaves at the top comes in at the bottom, in the first step where it was put outside.
 /// Only gravity and the vertical field know no images in z, so let the box be higher than bodies get. The
 /// radii of two that touch must add up to at most half an edge, and bodies go less than half a box in a step:
-/// of each pair only the image that is nearest where a step begins is looked at.
+/// of each pair only the image that is nearest where a step begins, or a blow sends one of them elsewhere, is
+/// looked at.
 template <Real S>
 class Domain {
  public:
@@ -112,6 +113,20 @@ class Domain {
     if (kind_ == DomainKind::ShearPeriodic) {
       v[1] += boxes * shearSpeed();
     }
+  }
+
+  /// The image that is nearest at t [s] after `time`, with the way [m] that r goes until then: where it is at
+  /// `time`. Two that were struck on their way begin it, as it seems, anywhere.
+  Vector3<S> imageAt(const Vector3<S>& r, const Vector3<S>& way, const S& t, Vector3<S>& v,
+                     const S& time) const {
+    if (isOpen()) {
+      return r;
+    }
+    Vector3<S> later = r + way;
+    Vector3<S> drift = Vector3<S>::Zero();
+    minimumImage(later, drift, S(time + t));
+    v += drift;
+    return later - way - t * drift;
   }
 
   /// Brings a body into the box, with the velocity that its image there has. Nothing in an open domain.

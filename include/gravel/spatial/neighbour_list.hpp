@@ -10,8 +10,8 @@
 
 namespace gravel {
 
-/// Keeps the pairs of one search for as long as they are certain to hold every pair within reach. They are
-/// always a superset of what a fresh search would give, so that the skin has no say in any result.
+/// Keeps the pairs of one search for as long as they are certain to hold every pair within reach, so that the
+/// skin has no say in any result.
 ///
 /// In a shear-periodic box ways are measured against the flow -(3/2) Omega x, in whose frame the images stand
 /// still, and what the flow itself can bring a touching pair nearer is taken off the skin. A list can be
@@ -25,7 +25,8 @@ class NeighbourList {
   /// \param revision any number that changes whenever indices come to name other bodies
   /// \param margin [m] >= 0
   /// \throws std::invalid_argument for values that are not finite, negative radii or margin, unlike lengths
-  /// \param travel  `travel(i)`: way [m] of body i while the list is to hold; `AtRest` for none
+  /// \param travel  `travel(i)`: way [m] of body i while the list is to hold; `AtRest` for none; and
+  ///   `bend(i)`, of detail::bendOf()
   /// \param h [s] that these ways take, for a sheared domain
   template <class Positions, class Radii, class Ids, class Travel = AtRest>
   const std::vector<Pair>& update(const Positions& positions, const Radii& radii, const Ids& ids,
@@ -50,7 +51,8 @@ class NeighbourList {
     parallelForTasks(swift_.size(), [&](std::size_t k) {
       swiftPairs_[k].clear();
       detail::compare(swift_[k], positions, radii, ids, detail::wayOf<S>(rest, swift_[k]), rest,
-                      common_.ahead(), S(room_ - skin_), free_, domain_, now_, swiftPairs_[k]);
+                      common_.ahead(), S(room_ - skin_), free_, bend_, domain_, now_, S(0), S(0),
+                      swiftPairs_[k]);
     });
     for (std::size_t k = 0; k < swift_.size(); ++k) {
       extra_.insert(extra_.end(), swiftPairs_[k].begin(), swiftPairs_[k].end());
@@ -63,16 +65,17 @@ class NeighbourList {
 
   /// A body has taken another course since the update: appends to `out` the pairs that its new way adds to
   /// those of pairs(). O(1) while it stays in its half of the skin, else O(N).
-  /// \param way [m] from positions[i]
+  /// \param way [m] from positions[i], as from the update on \param t, share [s] [1] of ways since then
   template <class Positions, class Radii, class Ids, class Travel>
   void follow(std::uint32_t i, const Positions& positions, const Radii& radii, const Ids& ids,
-              const Vector3<S>& way, const Travel& travel, std::vector<Pair>& out) {
-    if (!(farthest_sq(i, positions[i], way) <= half_sq_)) {
+              const Vector3<S>& way, const Travel& travel, std::vector<Pair>& out, const S& t = S(0),
+              const S& share = S(0)) {
+    if (!(withBend_sq(farthest_sq(i, positions[i], way), i, travel) <= half_ * half_)) {
       ++comparisons_;
       strays_ = true;
       detail::compare(i, positions, radii, ids, common_.lessThis(Vector3<S>(positions[i]), way),
-                      common_.lessThis(positions, travel), common_.ahead(), S(room_ - skin_), free_, domain_,
-                      now_, out);
+                      common_.lessThis(positions, travel), common_.ahead(), S(room_ - skin_), free_, bend_,
+                      domain_, now_, t, share, out);
     }
   }
 
@@ -97,19 +100,16 @@ class NeighbourList {
   std::uint64_t version() const { return version_; }
   /// Whether some body was, or is on a way to be, half the skin from where the last search saw it.
   bool strays() const { return strays_ || !swift_.empty() || !common_.isNone(); }
-  /// Whether the last update searched.
-  bool rebuilt() const { return rebuilt_; }
+  bool rebuilt() const { return rebuilt_; }  ///< whether the last update searched
   std::uint64_t searches() const { return searches_; }
-  /// Why the last update searched, or why it did not.
-  const char* reason() const {
+  const char* reason() const {  ///< why the last update searched, or did not
     return rebuilt_            ? reason_
            : !common_.isNone() ? "no body has left the others by half the skin since the last search"
                                : "no body has moved half the skin since the last search";
   }
-  /// The skin [m] of the list in use.
-  const S& skin() const { return skin_; }
-  /// Fixes the skin [m] >= 0 from the next search on; without a value it is chosen again from the motion
-  /// seen. Costs only: a thick skin means fewer searches and more candidates.
+  const S& skin() const { return skin_; }  ///< [m] of the list in use
+  /// Fixes the skin [m] >= 0 from the next search on, or has it chosen from the motion seen. Costs only: a
+  /// thick skin means fewer searches and more candidates.
   void setSkin(std::optional<S> skin) {
     if (skin) {
       detail::require("skin", *skin, detail::nonNegative<S>());
@@ -118,8 +118,7 @@ class NeighbourList {
   }
 
   void setKind(BroadPhaseKind kind) { search_.setKind(kind); }
-  /// Forgets the list, so that the next update searches.
-  void clear() { built_ = false; }
+  void clear() { built_ = false; }  ///< the next update searches
 
  private:
   /// nullptr if the list still holds, but for the swift.
@@ -142,7 +141,6 @@ class NeighbourList {
     if (free_ < S(0)) {
       return margin > S(0) ? "the margin grew or the flow used up the skin" : "the flow used up the skin";
     }
-    const std::size_t n = places_.size();
     const Vector3<S> last = domain.isOpen() ? Vector3<S>(Vector3<S>::Zero()) : common_.end();
     common_.clear();
     setHalf();
@@ -154,7 +152,7 @@ class NeighbourList {
       return Vector3<S>(last + domain.minimumImage(Vector3<S>(positions[i]) - places_[i] - last, time));
     };
     const auto moves = [&](std::size_t i) { return Vector3<S>(moved(i) + detail::wayOf<S>(travel, i)); };
-    common_.set(detail::commonWay<S>(n, moved), detail::commonWay<S>(n, moves));
+    common_.find(places_.size(), moved, moves, travel);
     setHalf();
     return common_.isNone() ? reason : whoMoved(positions, radii, travel);
   }
@@ -163,30 +161,31 @@ class NeighbourList {
   template <class Positions, class Radii, class Travel>
   const char* whoMoved(const Positions& positions, const Radii& radii, const Travel& travel) {
     const std::size_t n = places_.size();
+    const S common = detail::sumAbs(common_.bend());
     parts_.resize((n + chunk - 1) / chunk);
     parallelForChunks<Share::Alike>(n, chunk, [&](std::size_t begin, std::size_t end) {
-      const auto farthest = [&](std::size_t i) __attribute__((always_inline)) {
+      const auto straight = [&](std::size_t i) __attribute__((always_inline)) {
         return farthest_sq(i, positions[i], detail::wayOf<S>(travel, i));
       };
+      const auto bend = [&](std::size_t i) { return S(common + detail::mostBendOf<S>(travel, i)); };
+      const auto farthest = [&](std::size_t i) { return withBend_sq(straight(i), i, travel); };
       const auto same = [&](std::size_t i) { return radii[i] == radii_[i]; };
-      parts_[begin / chunk].look(begin, end, half_sq_, farthest, same);
+      parts_[begin / chunk].look(begin, end, half_, straight, bend, farthest, same);
     });
-    moved_sq_ = S(0);
+    moved_sq_ = bend_ = S(0);
     swift_.clear();
     for (const detail::Wandering<S>& part : parts_) {
-      if (part.otherRadius) {
-        return "a radius changed";
-      }
-      if (part.lost) {
-        return "a place is not finite";
+      if (part.otherRadius || part.lost) {
+        return part.otherRadius ? "a radius changed" : "a place is not finite";
       }
       moved_sq_ = std::max<S>(moved_sq_, part.moved_sq);
+      bend_ = std::max<S>(bend_, part.bend);
       swift_.insert(swift_.end(), part.swift.begin(), part.swift.end());
     }
     if (comparisons_ + swift_.size() <= mostComparisons && swift_.size() <= mostSwift(n)) {
       return nullptr;
     }
-    moved_sq_ = std::max<S>(moved_sq_, half_sq_);
+    moved_sq_ = std::max<S>(moved_sq_, half_ * half_);
     for (std::size_t c = 0; c < parts_.size() && swift_.size() > mostSwift(n); ++c) {
       moved_sq_ = std::max<S>(moved_sq_, parts_[c].most_sq);
     }
@@ -209,11 +208,16 @@ class NeighbourList {
     const S end_sq = end.squaredNorm();
     return end_sq > d_sq || !(end_sq == end_sq) ? end_sq : d_sq;
   }
+  template <class Travel>
+  S withBend_sq(const S& farthest_sq, std::size_t i, const Travel& travel) const {
+    return detail::squareOfSum<S>(farthest_sq,
+                                  Vector3<S>(detail::bendOf<S>(travel, i) - common_.bend()).squaredNorm());
+  }
 
   /// How far a body may get, less what subtraction loses: a few units in its last place.
   void setHalf() {
     const S half = free_ / S(2) - S(16) * detail::roundoff<S>() * common_.most();
-    half_sq_ = half > S(0) ? S(half * half) : S(0);
+    half_ = half > S(0) ? half : S(0);
   }
 
   template <class Ids>
@@ -232,32 +236,29 @@ class NeighbourList {
     built_ = false;  // stays so if the search throws
     places_.resize(n);
     radii_.resize(n);
-    largest_ = S(0);
+    largest_ = bend_ = S(0);
     std::vector<S> spheres;
     for (std::size_t i = 0; i < n; ++i) {
       places_[i] = positions[i];
       radii_[i] = radii[i];
       largest_ = std::max(largest_, radii_[i]);
+      bend_ = std::max<S>(bend_, detail::mostBendOf<S>(travel, i));
       if (radii_[i] > S(0)) {
         spheres.push_back(radii_[i]);
       }
     }
-    const auto middle = spheres.begin() + static_cast<std::ptrdiff_t>(spheres.size() / 2);
-    std::nth_element(spheres.begin(), middle, spheres.end());
-    const S median = spheres.empty() ? S(0) : *middle;
     using std::sqrt;
-    const S perUpdate =
-        motionSeen
-            ? S(S(2) * S(sqrt(moved_sq_)) / S(static_cast<double>(std::max<std::uint64_t>(1, updates_))))
-            : S(0);
-    skin_ = fixedSkin_ ? *fixedSkin_ : detail::skinFor(median, perUpdate);
+    const S updates = S(static_cast<double>(std::max<std::uint64_t>(1, updates_)));
+    const S perUpdate = motionSeen ? S(S(2) * S(sqrt(moved_sq_)) / updates) : S(0);
+    skin_ = fixedSkin_ ? *fixedSkin_ : detail::skinFor(spheres, perUpdate);
     swift_.clear();
     flow_ = S(0);
     common_.clear();
     if constexpr (!std::is_same_v<Travel, AtRest>) {
       if (domain.omega() == S(0)) {
-        common_.set(Vector3<S>::Zero(), detail::commonWay<S>(n, travel));
+        common_.findAhead(n, travel);
       }
+      bend_ += detail::sumAbs(common_.bend());
       skin_ = std::max<S>(
           skin_, detail::takeSwift(n, mostSwift(n), skin_, common_.lessThis(positions, travel), swift_));
     }
@@ -266,10 +267,8 @@ class NeighbourList {
     comparisons_ = 0;
     room_ = margin + skin_ * common_.spread() + common_.shearing() * (S(2) * largest_ + margin);
     // Distances at both times and the displacement are rounded: a few units of what is subtracted.
-    S scale = S(2) * largest_ + room_ + common_.most();
-    if (!domain.isOpen()) {
-      scale += domain.lengths().maxCoeff();
-    }
+    const S scale =
+        S(2) * largest_ + room_ + common_.most() + (domain.isOpen() ? S(0) : S(domain.lengths().maxCoeff()));
     const S slack = S(32) * detail::roundoff<S>() * scale;
     search_.findPairs(positions, radii, ids, S(room_ + slack), domain, time, pairs_);
     revision_ = revision;
@@ -281,8 +280,7 @@ class NeighbourList {
 
   static constexpr const char* tooFar = "bodies moved half the skin";
   static constexpr std::size_t chunk = 512;
-  /// A search costs about as much as this many comparisons of one body with all others.
-  static constexpr std::size_t mostComparisons = 128;
+  static constexpr std::size_t mostComparisons = 128;  ///< of one with all, that cost what a search does
   static std::size_t mostSwift(std::size_t n) { return std::min<std::size_t>(8, n / 64); }
 
   BroadPhase<S> search_;
@@ -294,15 +292,16 @@ class NeighbourList {
   std::vector<std::vector<Pair>> swiftPairs_;  ///< of each of them
   std::vector<Pair> extra_;                    ///< all of these, and more that were added
   std::vector<Pair> joined_;                   ///< pairs_ and extra_
-  std::size_t comparisons_ = 0;                ///< of one body with all others since the last search
+  std::size_t comparisons_ = 0;                ///< since the last search
   Domain<S> domain_;
   S time_ = S(0);
   S now_ = S(0);  ///< of the last update
   S largest_ = S(0);
   S skin_ = S(0);
-  S room_ = S(0);     ///< margin and skin of the last search
-  S free_ = S(0);     ///< what is left of the skin
-  S half_sq_ = S(0);  ///< how far a body may get, squared
+  S room_ = S(0);  ///< margin and skin of the last search
+  S free_ = S(0);  ///< what is left of the skin
+  S half_ = S(0);  ///< how far a body may get
+  S bend_ = S(0);  ///< of any way, at most
   detail::CommonMotion<S> common_;
   S flow_ = S(0);  ///< [1] shear since the last search
   S moved_sq_ = S(0);

@@ -17,27 +17,35 @@ template <Real S>
 struct Wandering {
   S moved_sq = S(0);  ///< most of those that did not get too far
   S most_sq = S(0);   ///< most of the others, the swift
+  S bend = S(0);      ///< [m] the most
   bool otherRadius = false;
   bool lost = false;  ///< one is at no finite place
   std::vector<std::uint32_t> swift;
 
   /// For bodies [begin, end).
-  /// \param farthest  farthest(i): squared distance [m^2], NaN where a coordinate is
+  /// \param straight, farthest  straight(i): squared distance [m^2] along the chord, NaN where a coordinate
+  ///   is; farthest(i): on the path \param mostBend  mostBend(i): no more than this [m] are they apart
   /// \param same  same(i): whether the radius is what it was
-  template <class Farthest, class Same>
-  void look(std::size_t begin, std::size_t end, const S& within_sq, Farthest&& farthest, Same&& same) {
-    moved_sq = most_sq = S(0);
+  template <class Straight, class MostBend, class Farthest, class Same>
+  void look(std::size_t begin, std::size_t end, const S& within, Straight&& straight, MostBend&& mostBend,
+            Farthest&& farthest, Same&& same) {
+    moved_sq = most_sq = bend = S(0);
     lost = false;
     swift.clear();
+    const auto isNear = [&](std::size_t i, const S& d_sq) {
+      const S left = within - mostBend(i);
+      return (left >= S(0)) & (d_sq <= left * left);
+    };
     // Mostly all are near: first a loop without branches.
     bool near = true;
     bool alike = true;
     S most(0);
     for (std::size_t i = begin; i < end; ++i) {
-      const S d_sq = farthest(i);
-      near = near & (d_sq <= within_sq);
+      const S d_sq = straight(i);
+      near = near & isNear(i, d_sq);
       alike = alike & same(i);
       most = d_sq > most ? d_sq : most;
+      bend = std::max<S>(bend, mostBend(i));
     }
     otherRadius = !alike;
     if (near) {
@@ -45,8 +53,9 @@ struct Wandering {
       return;
     }
     for (std::size_t i = begin; i < end; ++i) {
-      const S d_sq = farthest(i);
-      if (d_sq <= within_sq) {
+      S d_sq = straight(i);
+      d_sq = isNear(i, d_sq) ? d_sq : farthest(i);
+      if (d_sq <= within * within) {
         moved_sq = std::max<S>(moved_sq, d_sq);
       } else {
         swift.push_back(static_cast<std::uint32_t>(i));
@@ -60,10 +69,13 @@ struct Wandering {
 /// [m] So thick that a list would hold for sixteen updates of the motion last seen, within a fraction of the
 /// median radius (a mean would be that of a giant among grains); no skin at all where it would not even hold
 /// for two.
-/// \param perUpdate [m] what an update took of the skin; 0 if that is not known
+/// \param radii [m] in any order \param perUpdate [m] what an update took of the skin; 0 if that is not known
 template <Real S>
-S skinFor(const S& radius, const S& perUpdate) {
+S skinFor(std::vector<S>& radii, const S& perUpdate) {
   constexpr double goodLife = 16.0;
+  const auto middle = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2);
+  std::nth_element(radii.begin(), middle, radii.end());
+  const S radius = radii.empty() ? S(0) : *middle;
   const S thickest = S(0.8) * radius;
   const S thinnest = S(0.02) * radius;
   if (!(perUpdate > S(0))) {
@@ -80,16 +92,20 @@ S skinFor(const S& radius, const S& perUpdate) {
 /// \param travel `travel(j)`: way [m] of body j; `AtRest` for none
 /// \param ahead [1] of CommonMotion, less whose frame these ways are
 /// \param slack [m] added to the sum of the radii
-/// \param free [m] what is left of the skin
+/// \param free [m] what is left of the skin \param most [m] bend of any
+/// \param t, share [s] [1] of the ways when the image that is nearest is looked at: see Domain::imageAt()
 template <Real S, class Positions, class Radii, class Ids, class Travel>
 void compare(std::uint32_t i, const Positions& positions, const Radii& radii, const Ids& ids,
              const Vector3<S>& own, const Travel& travel, const S& ahead, const S& slack, const S& free,
-             const Domain<S>& domain, const S& time, std::vector<Pair>& out) {
+             const S& most, const Domain<S>& domain, const S& time, const S& t, const S& share,
+             std::vector<Pair>& out) {
   const Vector3<S> x = positions[i];
   Vector3<S> way = own;
   S length_sq = way.squaredNorm();
   using std::sqrt;
-  S widest = slack + free + S(sqrt(length_sq));
+  const S bend = S(sqrt(bendOf<S>(travel, i).squaredNorm()));
+  const S aside = slack + free + bend + most;
+  S widest = aside + S(sqrt(length_sq));
   const S rounded = S(1) + S(16) * roundoff<S>();
   const S r_i = radii[i];
   const std::uint64_t id = idKey(ids[i]);
@@ -98,21 +114,25 @@ void compare(std::uint32_t i, const Positions& positions, const Radii& radii, co
     if (j == i || !(radii_ij > S(0))) {
       continue;
     }
-    const Vector3<S> r = domain.minimumImage(Vector3<S>(positions[j]) - x, time);
+    Vector3<S> drift = Vector3<S>::Zero();
+    const Vector3<S> way_j = wayOf<S>(travel, j);
+    const Vector3<S> r = domain.imageAt(Vector3<S>(Vector3<S>(positions[j]) - x),
+                                        Vector3<S>(share * (way_j - own)), t, drift, time);
     if (!(ahead == S(0))) {  // as seen from the flow where j is
       way[1] = own[1] + ahead * r[0];
       length_sq = way.squaredNorm();
-      widest = slack + free + S(sqrt(length_sq));
+      widest = aside + S(sqrt(length_sq));
     }
-    const S way_sq = wayOf<S>(travel, j).squaredNorm();
+    S way_sq = way_j.squaredNorm();
     // Most are too far for any of what follows: (a + b)^2 <= 2 (a^2 + b^2).
     const S near = radii_ij + widest;
     if (r.squaredNorm() > S(2) * rounded * (near * near + way_sq)) {
       continue;
     }
+    way_sq = squareOfSum<S>(way_sq, bendOf<S>(travel, j).squaredNorm());
     // Another course may take it anywhere within its half of the skin, which is this far at most.
     const S far = std::max<S>(S(sqrt(way_sq)), free);
-    const S reach = radii_ij + slack + far;
+    const S reach = radii_ij + slack + bend + far;
     // The nearest point of the way: x + way s, 0 <= s <= 1.
     const S s = length_sq > S(0) ? std::min<S>(S(1), std::max<S>(S(0), S(way.dot(r) / length_sq))) : S(0);
     if (Vector3<S>(r - s * way).squaredNorm() <= reach * reach * rounded) {
@@ -134,7 +154,7 @@ S takeSwift(std::size_t n, std::size_t most, const S& skin, const Travel& travel
   using std::sqrt;
   std::vector<S> ways(n);
   for (std::size_t i = 0; i < n; ++i) {
-    ways[i] = wayOf<S>(travel, i).squaredNorm();
+    ways[i] = squareOfSum<S>(wayOf<S>(travel, i).squaredNorm(), bendOf<S>(travel, i).squaredNorm());
     if (!isFinite(ways[i])) {
       return S(0);  // the search will say which
     }
