@@ -36,7 +36,7 @@ struct ContactArrays {
   std::span<const S> radius;
   std::span<const S> inertiaFactor;     ///< k in I = k m r^2
   std::span<const std::uint32_t> flag;  ///< bits of BodyFlag
-  std::span<const std::uint64_t> id;    ///< all different
+  std::span<const std::uint64_t> id;    ///< all different, below 2^63
   std::span<const std::uint32_t> material;
 
   std::size_t size() const { return position.size(); }
@@ -52,8 +52,8 @@ struct ContactArrays {
   auto materials() const { return material; }
 
   /// Called where contacts are found and taken up. O(bodies).
-  /// \throws std::invalid_argument unless all are of one length, masses and radii finite and >= 0, and
-  /// inertia factors finite and > 0
+  /// \throws std::invalid_argument unless all are of one length, masses and radii finite and >= 0, inertia
+  /// factors finite and > 0, and ids below 2^63
   void requireWhole() const {
     const auto require = [this](const char* what, std::size_t length) {
       if (length != size()) {
@@ -74,6 +74,9 @@ struct ContactArrays {
       requireOf("mass", mass[i], i, detail::nonNegative<S>());
       requireOf("radius", radius[i], i, detail::nonNegative<S>());
       requireOf("inertia factor", inertiaFactor[i], i, detail::positive<S>());
+      if (id[i] >= std::uint64_t{1} << 63U) {  // names of boundaries
+        detail::refuse("id of body " + std::to_string(i), std::to_string(id[i]), "below 2^63");
+      }
     }
   }
 
