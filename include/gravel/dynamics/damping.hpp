@@ -31,7 +31,8 @@ Scalar damp(Bodies<Scalar, Layout>& bodies, const Scalar& c, const Scalar& c_w, 
       if (body.isFixed()) {
         continue;
       }
-      const Scalar v_sq = body.velocity().squaredNorm();
+      // Values, of which Eigen adds the squares in one order wherever they stand.
+      const Scalar v_sq = Vector3<Scalar>(body.velocity()).squaredNorm();
       const Scalar turning = body.rotationalEnergy();
       if (!(f == Scalar(1))) {
         const Vector3<Scalar> v = body.velocity();
@@ -39,7 +40,7 @@ Scalar damp(Bodies<Scalar, Layout>& bodies, const Scalar& c, const Scalar& c_w, 
         body.velocity() = Vector3<Scalar>(v - u) + f * u;
       }
       body.angularVelocity() *= f_w;
-      lost += half * Scalar(body.mass()) * (v_sq - Scalar(body.velocity().squaredNorm())) +
+      lost += half * Scalar(body.mass()) * (v_sq - Vector3<Scalar>(body.velocity()).squaredNorm()) +
               (turning - body.rotationalEnergy());
     }
     return lost;
