@@ -10,6 +10,7 @@
 #include <gravel/core/parallel.hpp>
 
 #include <algorithm>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -98,8 +99,9 @@ class Bodies {
   BodyId add(const Body<Scalar>& body) { return add(body, BodyId{nextId_}); }
 
   /// As above under a given id: a restart gives each body its own again. Ids chosen by `add(body)` are above
-  /// all ids ever given. \throws std::invalid_argument also if the id is taken.
-  BodyId add(const Body<Scalar>& body, BodyId id) {
+  /// all ids ever given. \throws std::invalid_argument also if the id is taken, and what last(its index) does
+  template <class Last = std::identity>
+  BodyId add(const Body<Scalar>& body, BodyId id, const Last& last = {}) {
     const std::uint64_t key = toInteger(id);
     if (find(id) || id == noBody) {
       detail::refuse("id of the new body", std::to_string(key),
@@ -113,7 +115,9 @@ class Bodies {
       (*this)[i].store(body);
       (*this)[i].clearForces();
       places_.put(key, i);
+      (void)last(i);
     } catch (...) {
+      places_.forget(key);
       storage_.resize(i);
       throw;
     }

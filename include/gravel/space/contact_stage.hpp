@@ -170,6 +170,8 @@ class ContactStage {
     }
   }
 
+  /// The solver takes contacts up anew before it goes on, by ids, as if nothing had been.
+  void suspend();
   /// Bodies are in a new order; contacts and impacts know theirs by id. \return whether all of them are there
   bool renumber(const Bodies& bodies);
 

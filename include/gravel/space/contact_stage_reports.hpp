@@ -157,6 +157,14 @@ bool ContactStage<Scalar, Layout>::renumber(const Bodies& bodies, Pair& pair) {
 }
 
 template <Real Scalar, class Layout>
+void ContactStage<Scalar, Layout>::suspend() {
+  if (coloured_) {
+    resumed_ = solver_.solved();
+    coloured_ = false;
+  }
+}
+
+template <Real Scalar, class Layout>
 bool ContactStage<Scalar, Layout>::renumber(const Bodies& bodies) {
   bool complete = true;
   for (Contact<Scalar>& c : contacts_) {
@@ -166,10 +174,7 @@ bool ContactStage<Scalar, Layout>::renumber(const Bodies& bodies) {
     complete = renumber(bodies, impact) && complete;
   }
   revision_ = complete ? bodies.revision() : revision_;
-  if (coloured_) {
-    resumed_ = solver_.solved();  // the solver counts bodies by ids: it goes on as if nothing had been
-    coloured_ = false;
-  }
+  suspend();
   known_ = false;  // indices are others
   moved_ = false;
   return complete;

@@ -151,14 +151,14 @@ class ForceStage {
     return parts;
   }
   /// Bodies are in a new order: that at order[i] stands at i.
-  void reorder(std::span<const std::size_t> order) {
-    if (hookForces_.size() == order.size()) {
-      const std::vector<Vector3<Scalar>> before = hookForces_;
-      for (std::size_t i = 0; i < order.size(); ++i) {
-        hookForces_[i] = before[order[i]];
-      }
+  std::vector<Vector3<Scalar>> hookForcesIn(std::span<const std::size_t> order) const {
+    std::vector<Vector3<Scalar>> forces = hookForces_;
+    for (std::size_t i = 0; i < order.size() && forces.size() == order.size(); ++i) {
+      forces[i] = hookForces_[order[i]];
     }
+    return forces;
   }
+  void setHookForces(std::vector<Vector3<Scalar>>&& forces) { hookForces_ = std::move(forces); }
   void setHookParts(const std::vector<Scalar>& parts) {
     hookForces_.clear();
     for (std::size_t i = 0; i + 2 < parts.size(); i += 3) {

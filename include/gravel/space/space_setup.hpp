@@ -49,16 +49,12 @@ template <Real Scalar, class Layout>
 BodyId Space<Scalar, Layout>::addBody(const Body<Scalar>& body) {
   this->inStep_.refuse("addBody()");
   contact_.materials.check(static_cast<std::uint32_t>(body.material), "the new body");
-  const BodyId id = bodies_.add(body);
+  Scalar energy(0);
+  const BodyId id = bodies_.add(body, bodies_.nextId(), [&](std::size_t i) {
+    energy = ledgerOpen_ ? bindingEnergy(i, time_) : energy;  // throws if another body is not what it may be
+  });
+  left_.exchange -= energy;
   forcesValid_ = false;
-  if (ledgerOpen_) {
-    try {
-      left_.exchange -= bindingEnergy(n() - 1, time_);
-    } catch (...) {  // another body is not what it may be
-      bodies_.remove(id);
-      throw;
-    }
-  }
   return id;
 }
 
@@ -72,10 +68,10 @@ void Space<Scalar, Layout>::removeBody(BodyId id) {
     known = isFinite(Vector(bodies_.positions()[k])) && isFinite(m) && m >= Scalar(0);
   }
   const Scalar energy = known ? bindingEnergy(i, time_) : Scalar(0);
+  bodies_.remove(id);
   if (isFinite(energy)) {  // who has written what is no number must be able to get rid of it
     left_.exchange += energy;
   }
-  bodies_.remove(id);
   forcesValid_ = false;
 }
 
@@ -84,8 +80,10 @@ void Space<Scalar, Layout>::reorderBodies() {
   this->inStep_.refuse("reorderBodies()");
   forcesValid_ = forcesValid_ && !placesChanged();
   const std::vector<std::size_t> order = mortonOrder(bodies_.positions());
-  bodies_.reorder(order);
-  force_.reorder(order);
+  auto ofHook = force_.hookForcesIn(order);
+  contact_.suspend();
+  bodies_.reorder(order);  // nothing asks for memory from here on
+  force_.setHookForces(std::move(ofHook));
   contact_.renumber(bodies_);
   if (forcesValid_) {  // they moved along with their bodies
     rememberPlaces();

@@ -1,0 +1,120 @@
+#include "laws/laws.hpp"
+#include "support/catch.hpp"
+#include "support/space.hpp"
+
+#include <cstdlib>
+#include <functional>
+#include <new>
+
+using namespace gravel;
+using namespace gravel::test;
+
+namespace {
+
+thread_local long allowed = -1;  // pieces of memory until there is no more; below 0: as many as are asked for
+
+void* piece(std::size_t bytes) {
+  void* memory = allowed == 0 ? nullptr : std::malloc(bytes > 0 ? bytes : 1);
+  if (memory == nullptr) {
+    throw std::bad_alloc();
+  }
+  allowed -= allowed > 0 ? 1 : 0;
+  return memory;
+}
+
+}  // namespace
+
+// For this whole program: what is asked for with an alignment of its own is not counted.
+void* operator new(std::size_t bytes) { return piece(bytes); }
+void* operator new[](std::size_t bytes) { return piece(bytes); }
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete[](void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace {
+
+Space<double> heap() {
+  SimulationConfig<double> config = plain(1e-2);
+  config.G = 0.3;
+  config.coeffFriction = config.coeffStaticFriction = 0.4;
+  Space<double> space(config);
+  space.setUniformField({0, 0, -5});
+  space.addBox({-2, -2, -2}, {2, 2, 2});
+  for (int i = 0; i < 40; ++i) {
+    space.addBody(
+        ball({0.7 * (i % 4) - 1, 0.7 * (i / 4 % 4) - 1, 0.7 * (i / 16) - 1.5 + 0.01 * i}, {0.1, 0, 0}, 0.25));
+  }
+  space.setForceHook([](Bodies<double, SoA>& bodies, double) {
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      bodies.forces()[i] += Vec(0.01 * static_cast<double>(toInteger(bodies[i].id())), 0, 0);
+    }
+  });
+  advance(space, 60);
+  return space;
+}
+
+std::vector<double> all(const Space<double>& space) {
+  std::vector<double> state = stateOf(space);
+  const EnergyLedger<double> e = space.energyLedger();
+  state.insert(state.end(), {e.potential, e.restitution, e.friction, e.work, e.exchange});
+  for (const ContactImpulse<double>& j : space.contactImpulses()) {
+    state.push_back(j.normal);
+  }
+  return state;
+}
+
+/// That `change` failed changed nothing: now, in the steps that follow, or in the id that comes next.
+void checkUntouched(Space<double> space, Space<double> twin) {
+  CHECK(sameBits(all(space), all(twin)));
+  advance(space, 3);
+  advance(twin, 3);
+  CHECK(sameBits(all(space), all(twin)));
+  CHECK(space.addBody(ball({9, 9, 9}, {0, 0, 0}, 0.1)) == twin.addBody(ball({9, 9, 9}, {0, 0, 0}, 0.1)));
+}
+
+}  // namespace
+
+// Seen to fail: the energy of a body booked before it was taken out, which then stayed; bodies in a new
+// order, with the hook's forces and the contacts in the old one.
+TEST_CASE("A body that comes or goes, or a new order, for which there is no memory changes nothing") {
+  const Space<double> before = heap();
+  CHECK(before.contactCount() > 20);
+  using Change = std::function<void(Space<double>&)>;
+  const std::vector<Change> changes{[](Space<double>& space) {
+                                      space.addBody(ball({0, 0, 1.7}, {0, 0, 0}, 0.2));
+                                    },
+                                    [](Space<double>& space) { space.removeBody(BodyId{5}); },
+                                    [](Space<double>& space) { space.reorderBodies(); }};
+  for (std::size_t c = 0; c < changes.size(); ++c) {
+    bool failed = true;
+    long pieces = 0;
+    for (; failed; ++pieces) {
+      Space<double> space(before);
+      failed = false;
+      allowed = pieces;
+      try {
+        changes[c](space);
+      } catch (const std::bad_alloc&) {
+        failed = true;
+      }
+      allowed = -1;
+      if (failed) {
+        CAPTURE(c, pieces);
+        checkUntouched(space, before);
+      }
+    }
+    CHECK(pieces > 1);
+  }
+}
+
+// Seen to fail: the id of the refused one was skipped, and the next step found forces and contacts anew.
+TEST_CASE("A body that is refused for another one's sake changes nothing, the next id included") {
+  const Space<double> before = heap();
+  Space<double> space(before);
+  const double x = space.body(7).position()[0];
+  space.body(7).position()[0] = std::numeric_limits<double>::quiet_NaN();
+  CHECK_THROWS_AS(space.addBody(ball({0, 0, 1.7}, {0, 0, 0}, 0.2)), std::invalid_argument);
+  space.body(7).position()[0] = x;
+  checkUntouched(space, before);
+}
