@@ -48,6 +48,7 @@ void Diagnostics::record(const Space<double>& space) {
   if (h.rows == 0) {
     h.first = e;
     h.inPlay = liftEnergy(space);
+    h.closes = space.getG() == 0.0 || space.domain().shearSpeed() == 0.0;
   }
   h.last = e;
   see(e.kinetic + e.rotational);

@@ -164,8 +164,11 @@ void addEnergy(std::string& text, const History& h) {
                                : "%.2g of the most kinetic energy seen is left.\n",
                    left);
   }
-  text += format("The energy ledger is off by %.1e of the energy in play at the end, %.1e at most.\n",
-                 std::abs(h.drift()), h.worstDrift);
+  text +=
+      format(h.closes ? "The energy ledger is off by %.1e of the energy in play at the end, %.1e at most.\n"
+                      : "The energy ledger moved by %.1e of the energy in play at the end, %.1e at most, the "
+                        "work of the shear by gravity among it.\n",
+             std::abs(h.drift()), h.worstDrift);
   if (!h.isToBeTrusted()) {
     text += "This run is not to be trusted: energy came from nothing or was lost. Take a shorter timeStep.\n";
   }
