@@ -210,7 +210,7 @@ class ForceStage {
     ahead_ = now_;
     const bool touches = contactKicks.velocities.size() == bodies.size();
     for (std::size_t i = 0; i < bodies.size(); ++i) {
-      if (!bodies[i].isFixed()) {
+      if (!bodies[i].isHeld()) {
         ahead_[i].v += behind.velocities * Vector3<Scalar>(bodies[i].acceleration());
         ahead_[i].w += behind.spins * Vector3<Scalar>(bodies[i].angularAcceleration());
         if (!behind.kicks.empty()) {

@@ -56,9 +56,8 @@ class HookWork {
   void arrive(const Bodies& bodies, const Scalar& time) {
     late_ = time_ / Scalar(2);
     parallelFor(bodies.size(), detail::bodyGrain, [&](std::size_t i) {
-      const auto body = bodies[i];
-      ways_[i] += Vector3<Scalar>(body.position()) - places_[i];
-      middles_[i] = Vector3<Scalar>(body.velocity()) - late_ * Vector3<Scalar>(body.acceleration());
+      ways_[i] += Vector3<Scalar>(bodies[i].position()) - places_[i];
+      middles_[i] = middleOf(bodies, i);
     });
     time_ += time;
   }
@@ -66,12 +65,10 @@ class HookWork {
   /// `time` [s], which works on what they are now.
   void cross(const Bodies& bodies, const Scalar& time) {
     crossed_ += sumOver(bodies, Scalar(0), [&](std::size_t i) {
-      const auto body = bodies[i];
-      const Vector3<Scalar> jump =
-          Vector3<Scalar>(body.velocity()) - late_ * Vector3<Scalar>(body.acceleration()) - middles_[i];
+      const Vector3<Scalar> jump = middleOf(bodies, i) - middles_[i];
       middles_[i] += jump;
-      return body.inverseMass() > Scalar(0) ? Scalar(of(forces_, i).dot(jump) * (time / Scalar(2)))
-                                            : Scalar(0);
+      return bodies[i].inverseMass() > Scalar(0) ? Scalar(of(forces_, i).dot(jump) * (time / Scalar(2)))
+                                                 : Scalar(0);
     });
   }
   /// Blows of a drift of `time` [s] that is to come changed spins.
@@ -118,6 +115,13 @@ class HookWork {
 
   static Vector3<Scalar> of(Forces forces, std::size_t i) {
     return i < forces.size() ? forces[i] : Vector3<Scalar>(Vector3<Scalar>::Zero());
+  }
+
+  /// [m s^-1] of the step's middle, after a drift. What is held is not kicked.
+  Vector3<Scalar> middleOf(const Bodies& bodies, std::size_t i) const {
+    const auto body = bodies[i];
+    const Scalar late = body.isHeld() ? Scalar(0) : late_;
+    return Vector3<Scalar>(body.velocity()) - late * Vector3<Scalar>(body.acceleration());
   }
 
   /// Of what is not fixed.
