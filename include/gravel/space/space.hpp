@@ -142,7 +142,7 @@ class Space : public Settings<Scalar> {
 
   // Time.
 
-  /// One full step: advance, collide, forces, damping, next step size. An empty space only lets time pass.
+  /// One full step: advance, collide, forces, damping, next step size. Of an empty space only planes move.
   /// \param iteration number of this step; diagnostics are logged when it is a multiple of logFrequency
   /// \throws std::invalid_argument naming body and field if a value is not finite or out of range; nothing
   /// has moved then

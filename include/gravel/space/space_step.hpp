@@ -87,10 +87,10 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration, const Sc
   }
   Profiler::Step timing(profiler_);
   std::size_t more = 0;
+  previous_dt_ = h;
+  contact_.beginStep();
   if (!bodies_.empty()) {
     ledgerOpen_ = true;
-    previous_dt_ = h;
-    contact_.beginStep();
     parts_ = chooseParts(h);
     if (areFewPoints()) {
       more = moveFewPoints(h, until, timing);
@@ -108,7 +108,8 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration, const Sc
       sleep_.watch(bodies_, contact_, this->config_, h);
     }
   } else {
-    previous_dt_ = h;
+    parts_ = 1;
+    contact_.boundaries.advance(h);
     profiler_.skip(Phase::Integration, "no bodies");
   }
   contact_.boundaries.endStep();
