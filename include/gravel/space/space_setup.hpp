@@ -96,6 +96,7 @@ std::size_t Space<Scalar, Layout>::addPlane(const Vector& normal, Scalar offset,
   contact_.materials.check(static_cast<std::uint32_t>(material), "the new plane");
   const Plane<Scalar> plane = makePlane(normal, offset, material);
   wakeAll();
+  forcesValid_ = false;  // contacts are looked for again before the next step
   return contact_.boundaries.add(plane);
 }
 
@@ -106,6 +107,7 @@ std::vector<std::size_t> Space<Scalar, Layout>::addBox(const Vector& low, const 
   contact_.materials.check(static_cast<std::uint32_t>(material), "the new box");
   const auto faces = makeBox(low, high, material, open);
   wakeAll();
+  forcesValid_ = false;
   std::vector<std::size_t> numbers;
   for (const Plane<Scalar>& face : faces) {
     numbers.push_back(contact_.boundaries.add(face));
@@ -118,7 +120,7 @@ void Space<Scalar, Layout>::removePlane(std::size_t plane) {
   this->inStep_.refuse("removePlane()");
   contact_.boundaries.remove(plane);
   wakeAll();
-  forcesValid_ = false;  // contacts are looked for again before the next step
+  forcesValid_ = false;
 }
 
 template <Real Scalar, class Layout>
