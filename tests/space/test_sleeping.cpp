@@ -216,6 +216,29 @@ TEST_CASE("Sleepers wake where the world changes") {
   CHECK(sleepers(space) == 0);
 }
 
+// Seen to fail: they woke on a belt that moved as it did when they were found tired, and took a step with it.
+TEST_CASE("Who fell asleep on a belt that stopped wakes on one at rest") {
+  SimulationConfig<double> config = sleepy(0.1);
+  Space<double> space(config);
+  space.setUniformField({0, 0, -g});
+  const std::size_t belt = space.addPlane({0, 0, 1}, 0.0);
+  space.setPlaneVelocity(belt, {0.05, 0, 0});
+  space.addBody(ball({0, 0, 0.5}, {0.05, 0, 0}, 0.5));
+  advance(space, 60);
+  space.setPlaneVelocity(belt, {0, 0, 0});
+  advance(space, 40);
+  REQUIRE(sleepers(space) == 1);
+  const Vec place = space.body(0).position();
+  const EnergyLedger<double> before = space.energyLedger();
+  space.wakeAll();
+  advance(space, 1);
+  CHECK(sleepers(space) == 0);
+  const EnergyLedger<double> after = space.energyLedger();
+  CHECK((place - space.body(0).position()).norm() < 1e-15);
+  CHECK(std::abs(after.work - before.work) < 1e-15);
+  CHECK(std::abs(after.friction - before.friction) < 1e-15);
+}
+
 // Seen to fail: the hook saw sleepers fall at g h/2, so that a drag woke a ball one step after it fell
 // asleep, again and again (asleep 7 steps of 400); of a force that grew, a sleeper took work in a step of
 // parts.

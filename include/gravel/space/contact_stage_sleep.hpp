@@ -91,6 +91,9 @@ void ContactStage<Scalar, Layout>::add(const ContactList<Scalar>& contacts,
     contacts_.push_back(c, contacts.surface(c));
   }
   std::sort(contacts_.begin(), contacts_.end(), byKeys);
+  for (const Plane<Scalar>& plane : boundaries.planes()) {  // which may have stopped since
+    setDrift(plane.number, plane.velocity, Scalar(0));
+  }
   contactsChanged();
   moved_ = false;
 }
