@@ -239,6 +239,23 @@ TEST_CASE("Who fell asleep on a belt that stopped wakes on one at rest") {
   CHECK(std::abs(after.friction - before.friction) < 1e-15);
 }
 
+// Seen to fail: they slept on, for the pair stands in for the settings among themselves alone.
+TEST_CASE(
+    "Sleepers wake when the friction of the space changes, also where its pair with itself has its own") {
+  Space<double> space(sleepy());
+  const Material<double> rough{.staticFriction = 1.0, .kineticFriction = 1.0, .rollingFriction = 0.5};
+  space.setPairMaterial(defaultMaterial, defaultMaterial, rough);
+  space.addPlane({0, 0, 1}, 0.0, space.addMaterial(rough));
+  space.setUniformField({g * std::sin(0.2), 0, -g * std::cos(0.2)});
+  space.addBody(ball({0, 0, 0.5}, {0, 0, 0}, 0.5));
+  advance(space, 60);
+  REQUIRE(sleepers(space) == 1);
+  space.setCoeffFriction(0.0);
+  space.setCoeffStaticFriction(0.0);
+  advance(space, 1);
+  CHECK(sleepers(space) == 0);
+}
+
 // Seen to fail: the hook saw sleepers fall at g h/2, so that a drag woke a ball one step after it fell
 // asleep, again and again (asleep 7 steps of 400); of a force that grew, a sleeper took work in a step of
 // parts.

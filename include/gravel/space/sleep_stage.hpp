@@ -48,7 +48,7 @@ class SleepStage {
     if (islands_.empty()) {
       return;
     }
-    if (!(surface_ == contact.materials.pair(defaultMaterial, defaultMaterial, config))) {
+    if (!(surface_ == contact.materials.get(defaultMaterial, config))) {
       wakeAll();
     }
     for (SleepingIsland<Scalar>& island : islands_) {

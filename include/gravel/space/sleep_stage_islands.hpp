@@ -115,7 +115,7 @@ void SleepStage<Scalar, Layout>::findTired(const Bodies& bodies, const Contacts&
         lookForFixed(bodies, contact.domain);
       }
       islands_.push_back(std::move(found[k]));
-      surface_ = contact.materials.pair(defaultMaterial, defaultMaterial, config);
+      surface_ = contact.materials.get(defaultMaterial, config);
       numbered_ = false;
     }
   }
