@@ -608,6 +608,32 @@ TEST_CASE("What takes up another goes on pressing on what bears it, and falls as
   CHECK_THAT(space.planeForce(floor)[2], WithinRel(-3 * 9.8, 1e-3));
 }
 
+// Seen to fail: the hook was told that the sleeper is fixed, and the sleeper never got its velocity.
+TEST_CASE("A sleeper that something is put into counts as the movable body that it is") {
+  for (const double sleepSpeed : {0.0, 0.01}) {
+    SimulationConfig<double> config = plain(1e-2);
+    config.sleepSpeed = sleepSpeed;
+    config.sleepTime = 0.25;
+    Space<double> space(config);
+    space.setUniformField({0, 0, -9.8});
+    space.addPlane({0, 0, 1}, 0.0);
+    const BodyId rests = space.addBody(ball({0, 0, 0.5}, {0, 0, 0}, 0.5));
+    advance(space, 60);
+    REQUIRE(space.body(rests).isAsleep() == (sleepSpeed > 0));
+    std::size_t hits = 0;
+    space.setCollisionHook([&](const Hit& hit) {
+      ++hits;
+      CHECK_FALSE((hit.first.fixed || hit.second.fixed));
+      return Outcome::velocities(hit.second.velocity, {0, 0, 0}, hit.first.velocity, {0, 0, 0});
+    });
+    const BodyId comes = space.addBody(ball({1 - 1e-9, 0, 0.5}, {-1, 0, 0}, 0.5));
+    advance(space, 1);
+    CHECK(hits == 1);
+    CHECK_THAT(space.body(rests).velocity()[0], WithinRel(-1.0, 1e-12));
+    CHECK_THAT(space.body(comes).velocity()[0], WithinAbs(0.0, 1e-12));
+  }
+}
+
 TEST_CASE("Bodies that touch and part, or rest on each other, are nobody's decision") {
   Space<double> space(bouncy(1e-3));
   space.addBody(ball({0, 0, 0}, {-1, 0, 0}, 0.1, 2.0));

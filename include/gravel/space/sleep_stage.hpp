@@ -45,9 +45,6 @@ class SleepStage {
 
   /// Before a step of length h: marks what somebody changed since the last one.
   void lookForChanges(const Bodies& bodies, const Contacts& contact, const Config& config, const Scalar& h) {
-    if (islands_.empty()) {
-      return;
-    }
     if (!(surface_ == contact.materials.get(defaultMaterial, config))) {
       wakeAll();
     }
@@ -100,6 +97,14 @@ class SleepStage {
     return lost;
   }
 
+  /// Marks islands that something awake touches.
+  void lookForTouch(const Bodies& bodies, const Contacts& contact) {
+    number(bodies);
+    for (const Contact<Scalar>& c : contact.contacts(bodies)) {
+      rouseByTouch(c);
+    }
+  }
+
   /// Marks islands that something awake comes near to in the next step, of length h.
   void lookForApproach(const Bodies& bodies, Contacts& contact, const Config& config, const Scalar& time,
                        const Scalar& h, Profiler& profiler) {
@@ -133,10 +138,7 @@ class SleepStage {
   void watch(const Bodies& bodies, const Contacts& contact, const Config& config, const Scalar& h) {
     follow(bodies);
     if (!islands_.empty()) {
-      number(bodies);
-      for (const Contact<Scalar>& c : contact.contacts(bodies)) {
-        rouseByTouch(c);
-      }
+      lookForTouch(bodies, contact);
       for (const auto& impact : contact.impacts(bodies)) {
         rouseByTouch(impact);
       }
@@ -280,8 +282,9 @@ class SleepStage {
   }
 
   void rouse(std::uint32_t body) {
-    if (body < islandOf_.size() && islandOf_[body] != none) {
-      islands_[islandOf_[body]].state = IslandState::Waking;
+    const std::uint32_t k = body < islandOf_.size() ? islandOf_[body] : none;
+    if (k != none && islands_[k].state == IslandState::Asleep) {
+      islands_[k].state = IslandState::Waking;
     }
   }
 

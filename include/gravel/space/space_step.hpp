@@ -143,6 +143,10 @@ void Space<Scalar, Layout>::prepare() {
     rememberPlaces();
     stepGoesOn_ = false;
     updateAdaptiveTimeStep();
+    if (!sleep_.empty()) {  // a sleeper is no fixed body to whoever decides
+      sleep_.lookForTouch(bodies_, contact_);
+      sleep_.wake(bodies_, contact_);
+    }
     const std::vector<std::pair<BodyId, BodyId>> merges = decideTouching();
     forcesValid_ = true;
     mergeCollided(merges, time_);
