@@ -191,7 +191,7 @@ class ContactStage {
   const Scalar& memoryStep() const { return solver_.memoryStep(); }
   /// Contacts that nothing can move at either end leave the list, and are forgotten.
   void dropHeld(const Bodies& bodies);
-  /// Contacts join the list, with what is remembered of them.
+  /// Contacts join the list, with what is remembered of them. Those that are there stay as they are.
   void add(const ContactList<Scalar>& contacts, const std::vector<StoredImpulse<Scalar>>& memory);
 
   void save(SnapshotWriter& out) const;

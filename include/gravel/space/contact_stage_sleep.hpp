@@ -83,12 +83,18 @@ void ContactStage<Scalar, Layout>::dropHeld(const Bodies& bodies) {
 template <Real Scalar, class Layout>
 void ContactStage<Scalar, Layout>::add(const ContactList<Scalar>& contacts,
                                        const std::vector<StoredImpulse<Scalar>>& memory) {
+  const auto known = static_cast<std::ptrdiff_t>(contacts_.size());  // what merged is touched by its old id
+  const auto isNew = [&](const auto& one) {
+    return !std::binary_search(contacts_.begin(), contacts_.begin() + known, one, byKeys);
+  };
   std::vector<StoredImpulse<Scalar>> all = solver_.memory();
-  all.insert(all.end(), memory.begin(), memory.end());
+  std::copy_if(memory.begin(), memory.end(), std::back_inserter(all), isNew);
   std::sort(all.begin(), all.end(), byKeys);
   solver_.setMemory(all, solver_.memoryStep());
   for (const Contact<Scalar>& c : contacts) {
-    contacts_.push_back(c, contacts.surface(c));
+    if (isNew(c)) {
+      contacts_.push_back(c, contacts.surface(c));
+    }
   }
   std::sort(contacts_.begin(), contacts_.end(), byKeys);
   for (const Plane<Scalar>& plane : boundaries.planes()) {  // which may have stopped since

@@ -134,9 +134,8 @@ void Space<Scalar, Layout>::check() const {
 template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::prepare() {
   check();
-  wakeTheChanged();
   contact_.setIdle(false);  // until fallAsleep() has looked at those that came or woke
-  while (!forcesValid_ || placesChanged()) {
+  for (wakeTheChanged(); !forcesValid_ || placesChanged(); wakeTheChanged()) {
     forcesValid_ = false;  // if a hook throws
     applyGravity();
     buildCollisionGraph();
