@@ -3,7 +3,7 @@
 /// \file
 /// Files that hold exact bits: what `Space::save` writes and `Space::restore` reads.
 ///
-/// Layout: the line "gravel snapshot 8\n"; then records of (name, size of an element, number of elements,
+/// Layout: the line "gravel snapshot 9\n"; then records of (name, size of an element, number of elements,
 /// bytes) in the order in which they were written; then a 64-bit checksum (FNV-1a) of all before it. Numbers
 /// are in the machine's own form, so a file is read on the same kind of machine; anything else is refused.
 
@@ -23,7 +23,7 @@
 namespace gravel {
 
 namespace detail {
-inline constexpr char snapshotMagic[] = "gravel snapshot 8\n";
+inline constexpr char snapshotMagic[] = "gravel snapshot 9\n";
 inline std::uint64_t fnv1a(std::uint64_t hash, const unsigned char* bytes, std::size_t n) {
   for (std::size_t i = 0; i < n; ++i) {
     hash = (hash ^ bytes[i]) * 0x100000001B3ULL;

@@ -231,6 +231,8 @@ class ContactStage {
     present_.revision.reset();
   }
 
+  /// What the solves of the step before its last one gave.
+  StepRecord<Scalar> beforeLast() const;
   /// What was found last, whoever is there by now.
   std::vector<ContactImpulse<Scalar>> impulses() const;
   std::vector<Impact<Scalar>>& impacts() {

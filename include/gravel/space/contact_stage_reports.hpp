@@ -115,15 +115,26 @@ void ContactStage<Scalar, Layout>::forEachBefore(Visit&& visit) const {
 }
 
 template <Real Scalar, class Layout>
-std::vector<ContactImpulse<Scalar>> ContactStage<Scalar, Layout>::impulses() const {
-  std::vector<ContactImpulse<Scalar>> sum = solver_.copyImpulses();
-  sum.resize(contacts_.size());
-  record_.addTo(sum, contacts_);
+StepRecord<Scalar> ContactStage<Scalar, Layout>::beforeLast() const {
+  StepRecord<Scalar> sums = record_;
   if (firstActed_) {
-    StepRecord<Scalar> first;
-    first.add([&](auto&& visit) { forEachBefore(visit); });
-    first.addTo(sum, contacts_);
+    sums.add([&](auto&& visit) { forEachBefore(visit); });
   }
+  return sums;
+}
+
+template <Real Scalar, class Layout>
+std::vector<ContactImpulse<Scalar>> ContactStage<Scalar, Layout>::impulses() const {
+  const std::vector<ContactImpulse<Scalar>> last = solver_.copyImpulses();
+  const std::span<const ContactName> names = solver_.names();  // from a file those that bear something
+  std::vector<ContactImpulse<Scalar>> sum(contacts_.size());
+  for (std::size_t k = 0, of = 0; k < sum.size(); ++k) {
+    while (of < names.size() && names[of].keys < contacts_[k].keys()) {
+      ++of;
+    }
+    sum[k] = of < names.size() && names[of].keys == contacts_[k].keys() ? last[of] : sum[k];
+  }
+  beforeLast().addTo(sum, contacts_);
   return sum;
 }
 

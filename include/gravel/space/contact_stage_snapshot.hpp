@@ -40,11 +40,13 @@ void ContactStage<Scalar, Layout>::save(SnapshotWriter& out) const {
   out.array("materials of pairs", pairMaterials.data(), pairMaterials.size());
   std::vector<std::uint64_t> keys;
   numbers.clear();
-  for (const StoredImpulse<Scalar>& stored : solver_.memory()) {
-    const ContactImpulse<Scalar>& j = stored.impulse;
-    keys.insert(keys.end(), {stored.key1, stored.key2});
+  const auto put = [&](const ContactImpulse<Scalar>& j) {
     numbers.insert(numbers.end(), {j.normal, j.tangential[0], j.tangential[1], j.tangential[2], j.turning[0],
                                    j.turning[1], j.turning[2]});
+  };
+  for (const StoredImpulse<Scalar>& stored : solver_.memory()) {
+    keys.insert(keys.end(), {stored.key1, stored.key2});
+    put(stored.impulse);
   }
   std::vector<std::uint64_t> names;
   std::vector<Scalar> places;
@@ -61,6 +63,13 @@ void ContactStage<Scalar, Layout>::save(SnapshotWriter& out) const {
   out.array("materials of contacts", pairs.data(), pairs.size());
   out.array("keys of impulses", keys.data(), keys.size());
   out.array("impulses", numbers.data(), numbers.size());
+  numbers.clear();
+  std::vector<ContactImpulse<Scalar>> before(contacts_.size());
+  beforeLast().addTo(before, contacts_);
+  for (const ContactImpulse<Scalar>& j : before) {
+    put(j);
+  }
+  out.array("impulses of earlier solves", numbers.data(), numbers.size());
   out.value("step of impulses", solver_.memoryStep());
   out.value("step of gaps", gapStep_);
   const detail::SolvedProblem<Scalar> solved = coloured_ ? solver_.solved() : resumed_;
@@ -104,10 +113,11 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
   const auto pairs = in.array<Material<Scalar>>("materials of contacts");
   const auto keys = in.array<std::uint64_t>("keys of impulses");
   const std::vector<Scalar> impulses = in.finite<Scalar>("impulses");
+  const std::vector<Scalar> before = in.finite<Scalar>("impulses of earlier solves");
   if (sides.size() != 11 * surfaces.size() || planeNumbers.size() != surfaces.size() + 2 ||
       2 * impulses.size() != 7 * keys.size() || surfacesOf.empty() ||
-      places.size() * 4 != names.size() * 10 || pairs.size() * 4 != names.size() ||
-      ofPairs.size() != 2 * pairMaterials.size()) {
+      places.size() * 4 != names.size() * 10 || before.size() * 4 != names.size() * 7 ||
+      pairs.size() * 4 != names.size() || ofPairs.size() != 2 * pairMaterials.size()) {
     in.fail("holds lists of different lengths");
   }
   materials.assign(std::move(surfacesOf));
@@ -145,10 +155,17 @@ void ContactStage<Scalar, Layout>::load(SnapshotReader& in) {
                         {pairs[k], {c[6], c[7], c[8]}, c[9]});
   }
   std::vector<StoredImpulse<Scalar>> memory(keys.size() / 2);
+  const auto impulseAt = [](const Scalar* j) {
+    return ContactImpulse<Scalar>{j[0], {j[1], j[2], j[3]}, {j[4], j[5], j[6]}};
+  };
   for (std::size_t k = 0; k < memory.size(); ++k) {
-    const Scalar* j = &impulses[7 * k];
-    memory[k] = {keys[2 * k], keys[2 * k + 1], {j[0], {j[1], j[2], j[3]}, {j[4], j[5], j[6]}}};
+    memory[k] = {keys[2 * k], keys[2 * k + 1], impulseAt(&impulses[7 * k])};
   }
+  record_.add([&](auto&& visit) {
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+      visit(contacts_[k], impulseAt(&before[7 * k]));
+    }
+  });
   const auto step = in.value<Scalar>("step of impulses");
   gapStep_ = in.value<Scalar>("step of gaps");
   const std::vector<Scalar> to = in.finite<Scalar>("solved to");
