@@ -7,10 +7,10 @@
 #include <gravel/bodies/columns.hpp>
 #include <gravel/bodies/places_by_id.hpp>
 #include <gravel/bodies/proxy.hpp>
+#include <gravel/core/callback.hpp>
 #include <gravel/core/parallel.hpp>
 
 #include <algorithm>
-#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -100,7 +100,7 @@ class Bodies {
 
   /// As above under a given id: a restart gives each body its own again. Ids chosen by `add(body)` are above
   /// all ids ever given. \throws std::invalid_argument also if the id is taken, and what last(its index) does
-  template <class Last = std::identity>
+  template <class Last = DoNothing>
   BodyId add(const Body<Scalar>& body, BodyId id, const Last& last = {}) {
     const std::uint64_t key = toInteger(id);
     if (find(id) || id == noBody) {
@@ -115,7 +115,7 @@ class Bodies {
       (*this)[i].store(body);
       (*this)[i].clearForces();
       places_.put(key, i);
-      (void)last(i);
+      last(i);
     } catch (...) {
       places_.forget(key);
       storage_.resize(i);

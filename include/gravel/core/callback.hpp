@@ -12,6 +12,12 @@
 
 namespace gravel {
 
+/// To be called with anything, for nothing.
+struct DoNothing {
+  template <class... T>
+  void operator()(const T&... /*unused*/) const {}
+};
+
 template <class Signature>
 class Callback;
 

@@ -259,10 +259,6 @@ class ContactStage {
   Scalar fastestSwing() const;
   void renewGeometry(const Bodies& bodies, const Config& config, const Scalar& time);
 
-  template <class Course, class Support>
-  struct Ways;
-  template <class Course, class Support>
-  struct WaysAfterBlows;
   template <class Course>
   void strike(Bodies& bodies, const Config& config, Course& course, const Scalar& time, const Scalar& h,
               const PartOfStep<Scalar>& part, Profiler& profiler);

@@ -8,21 +8,22 @@
 
 namespace gravel {
 
+namespace detail {
+
 /// How bodies go through a step of length h, for a NeighbourList.
-template <Real Scalar, class Layout>
-template <class Course, class Support>
-struct ContactStage<Scalar, Layout>::Ways {
-  const Bodies& bodies;
+template <class B, class Course, class Support, Real Scalar>
+struct StepWays {
+  const B& bodies;
   const Course& course;
   const Support& support;
   Scalar h;
 
   Vector3<Scalar> operator()(std::size_t i) const {
-    return detail::isMovable(bodies, i) ? Vector3<Scalar>(course.velocity(bodies, i) * h)
-                                        : Vector3<Scalar>(Vector3<Scalar>::Zero());
+    return isMovable(bodies, i) ? Vector3<Scalar>(course.velocity(bodies, i) * h)
+                                : Vector3<Scalar>(Vector3<Scalar>::Zero());
   }
   Vector3<Scalar> bend(std::size_t i) const {
-    if (!detail::isMovable(bodies, i)) {
+    if (!isMovable(bodies, i)) {
       return Vector3<Scalar>::Zero();
     }
     Vector3<Scalar> a = course.acceleration(bodies, i);
@@ -32,10 +33,10 @@ struct ContactStage<Scalar, Layout>::Ways {
     return a * (h * h / Scalar(8));
   }
   Scalar mostBend(std::size_t i) const {
-    if (!detail::isMovable(bodies, i)) {
+    if (!isMovable(bodies, i)) {
       return Scalar(0);
     }
-    Scalar a = detail::sumAbs(Vector3<Scalar>(course.acceleration(bodies, i)));
+    Scalar a = sumAbs(Vector3<Scalar>(course.acceleration(bodies, i)));
     if constexpr (!std::is_same_v<Support, NoSupport>) {
       a += support.most();
     }
@@ -44,19 +45,20 @@ struct ContactStage<Scalar, Layout>::Ways {
 };
 
 /// The same where blows may have lifted bodies off what holds them: the larger bends.
-template <Real Scalar, class Layout>
-template <class Course, class Support>
-struct ContactStage<Scalar, Layout>::WaysAfterBlows {
-  const Ways<Course, Support>& ways;
+template <class B, class Course, class Support, Real Scalar>
+struct WaysAfterBlows {
+  const StepWays<B, Course, Support, Scalar>& ways;
 
   Vector3<Scalar> operator()(std::size_t i) const { return ways(i); }
   Vector3<Scalar> bend(std::size_t i) const {
     const Vector3<Scalar> held = ways.bend(i);
     const Vector3<Scalar> lifted =
-        Ways<Course, NoSupport>{ways.bodies, ways.course, NoSupport{}, ways.h}.bend(i);
+        StepWays<B, Course, NoSupport, Scalar>{ways.bodies, ways.course, NoSupport{}, ways.h}.bend(i);
     return lifted.squaredNorm() > held.squaredNorm() ? lifted : held;
   }
 };
+
+}  // namespace detail
 
 template <Real Scalar, class Layout>
 bool ContactStage<Scalar, Layout>::foresees(const Bodies& bodies, const Config& config, const Scalar& time,
@@ -68,8 +70,9 @@ bool ContactStage<Scalar, Layout>::foresees(const Bodies& bodies, const Config& 
     return false;
   }
   const FlightFromStart<Scalar> course{h};
-  search(bodies, config, time, Ways<FlightFromStart<Scalar>, NoSupport>{bodies, course, NoSupport{}, h}, h,
-         profiler);
+  search(bodies, config, time,
+         detail::StepWays<Bodies, FlightFromStart<Scalar>, NoSupport, Scalar>{bodies, course, NoSupport{}, h},
+         h, profiler);
   const Profiler::Scope scope(profiler, Phase::Impacts);
   prepareSurfaces(config);
   return impacts_.foresees(bodies, neighbours_.pairs(), domain, walls_, {time, h}, nearBoundaries(bodies, h),
@@ -122,14 +125,14 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
     // Of any, along the axes in sum.
     Scalar most() const { return none ? Scalar(0) : Scalar(Scalar(4) * solver.mostFall()); }
   } support{solver_, bodies, h, contacts_.empty()};
-  const Ways<Course, Support> ways{bodies, course, support, h};
+  const detail::StepWays<Bodies, Course, Support, Scalar> ways{bodies, course, support, h};
   search(bodies, config, time, ways, h, profiler);
   searched_ = true;
   const Profiler::Scope scope(profiler, Phase::Impacts);
   prepareSurfaces(config, part);
   struct Near {
     NeighbourList<Scalar>& list;
-    const WaysAfterBlows<Course, Support> travel;
+    const detail::WaysAfterBlows<Bodies, Course, Support, Scalar> travel;
     const std::vector<Pair>& pairs() const { return list.pairs(); }
     std::uint64_t version() const { return list.version(); }
     void follow(const Bodies& all, std::uint32_t i, const Scalar& t, std::vector<Pair>& out) {
