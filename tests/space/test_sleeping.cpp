@@ -621,4 +621,29 @@ TEST_CASE("Sleep is refused where nothing rests or touches") {
   }
 }
 
+// Seen to fail: looked for along the way of the step, which is none, it was a fixed ball to what struck it.
+TEST_CASE("A sleeper wakes for what reaches it within a step and is back at its end") {
+  const double h = 0.1, up = g * h / 2;
+  SimulationConfig<double> config = plain(h);
+  config.coeffRestitution = 1;
+  config.sleepSpeed = 0.1;
+  config.sleepTime = 0.2;
+  Space<double> space(config);
+  space.setUniformField({0, 0, -g});
+  for (const double x : {-0.8, 0.8}) {
+    Body<double> bearer = ball({x, 0, 1}, {0, 0, 0}, 0.5);
+    bearer.fixed = true;
+    space.addBody(bearer);
+  }
+  const BodyId sleeper = space.addBody(ball({0, 0, 1.6}, {0, 0, 0}, 0.5));
+  for (int k = 0; k < 40; ++k) {
+    space.computeDynamics(0);
+  }
+  REQUIRE(space.body(sleeper).isAsleep());
+  space.addBody(ball({0, 0, 1.1 - 0.01 - 8e-3}, {0, 0, up}, 0.01, 0.01));  // which would rise by 0.012
+  space.computeDynamics(0);
+  CHECK(space.impacts().size() == 1);
+  CHECK_FALSE(space.body(sleeper).isAsleep());
+}
+
 }  // namespace test_sleeping

@@ -25,16 +25,21 @@ void ContactStage<Scalar, Layout>::forEachApproach(const Bodies& bodies, const C
       leans[c.second] = 1;
     }
   }
-  const auto way = [&](std::size_t i) -> Vector3<Scalar> {
-    Vector3<Scalar> w = Vector3<Scalar>::Zero();
-    if (detail::isMovable(bodies, i)) {
-      w = h * Vector3<Scalar>(bodies.velocities()[i]);
-      if (leans[i] == 0) {
-        w += h * h / Scalar(2) * Vector3<Scalar>(bodies.accelerations()[i]);
-      }
+  struct Ways {
+    const Bodies& bodies;
+    const std::vector<unsigned char>& leans;
+    Scalar h;
+    Vector3<Scalar> operator()(std::size_t i) const {
+      return detail::isMovable(bodies, i)
+                 ? Vector3<Scalar>(h * Vector3<Scalar>(bodies.velocities()[i]) + Scalar(4) * bend(i))
+                 : Vector3<Scalar>(Vector3<Scalar>::Zero());
     }
-    return w;
-  };
+    Vector3<Scalar> bend(std::size_t i) const {
+      return detail::isMovable(bodies, i) && leans[i] == 0
+                 ? Vector3<Scalar>(h * h / Scalar(8) * Vector3<Scalar>(bodies.accelerations()[i]))
+                 : Vector3<Scalar>(Vector3<Scalar>::Zero());
+    }
+  } way{bodies, leans, h};
   search(bodies, config, time, way, h, profiler);
   for (const Pair& pair : neighbours_.pairs()) {
     const bool firstMoves = detail::isMovable(bodies, pair.first);
@@ -51,7 +56,8 @@ void ContactStage<Scalar, Layout>::forEachApproach(const Bodies& bodies, const C
         w_sq > Scalar(0) ? std::clamp<Scalar>(r.dot(w) / w_sq, Scalar(0), Scalar(1)) : Scalar(0);
     const bool fast = w_sq >= config.sleepSpeed * config.sleepSpeed * h * h;
     const Scalar radii = Scalar(bodies.radii()[one]) + Scalar(bodies.radii()[held]);
-    const Scalar reach = fast ? Scalar(radii * (Scalar(1) + detail::restingMargin<Scalar>())) : radii;
+    const Scalar reach = detail::safeNorm(way.bend(one)) +
+                         (fast ? Scalar(radii * (Scalar(1) + detail::restingMargin<Scalar>())) : radii);
     if (Vector3<Scalar>(r - share * w).squaredNorm() < reach * reach) {
       visit(held);
     }
