@@ -4,6 +4,7 @@
 
 #include <cstdlib>
 #include <functional>
+#include <limits>
 #include <new>
 
 using namespace gravel;
@@ -59,12 +60,12 @@ std::vector<double> all(const Space<double>& space) {
   const EnergyLedger<double> e = space.energyLedger();
   state.insert(state.end(), {e.potential, e.restitution, e.friction, e.work, e.exchange});
   for (const ContactImpulse<double>& j : space.contactImpulses()) {
-    state.push_back(j.normal);
+    state.insert(state.end(), {j.normal, j.tangential[0], j.tangential[1], j.tangential[2]});
   }
   return state;
 }
 
-/// That `change` failed changed nothing: now, in the steps that follow, or in the id that comes next.
+/// What failed changed nothing: now, in the steps that follow, or in the id that comes next.
 void checkUntouched(Space<double> space, Space<double> twin) {
   CHECK(sameBits(all(space), all(twin)));
   advance(space, 3);

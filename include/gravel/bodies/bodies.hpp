@@ -100,7 +100,7 @@ class Bodies {
 
   /// As above under a given id: a restart gives each body its own again. Ids chosen by `add(body)` are above
   /// all ids ever given. \throws std::invalid_argument also if the id is taken, and what last(its index) does
-  template <class Last = DoNothing>
+  template <class Last = detail::DoNothing>
   BodyId add(const Body<Scalar>& body, BodyId id, const Last& last = {}) {
     const std::uint64_t key = toInteger(id);
     if (find(id) || id == noBody) {

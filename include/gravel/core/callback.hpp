@@ -12,11 +12,15 @@
 
 namespace gravel {
 
+namespace detail {
+
 /// To be called with anything, for nothing.
 struct DoNothing {
   template <class... T>
   void operator()(const T&... /*unused*/) const {}
 };
+
+}  // namespace detail
 
 template <class Signature>
 class Callback;

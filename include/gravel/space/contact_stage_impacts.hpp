@@ -44,17 +44,15 @@ struct StepWays {
   }
 };
 
-/// The same where blows may have lifted bodies off what holds them: the larger bends.
+/// The same where blows may have lifted bodies off what holds them.
 template <class B, class Course, class Support, Real Scalar>
 struct WaysAfterBlows {
   const StepWays<B, Course, Support, Scalar>& ways;
 
   Vector3<Scalar> operator()(std::size_t i) const { return ways(i); }
-  Vector3<Scalar> bend(std::size_t i) const {
-    const Vector3<Scalar> held = ways.bend(i);
-    const Vector3<Scalar> lifted =
-        StepWays<B, Course, NoSupport, Scalar>{ways.bodies, ways.course, NoSupport{}, ways.h}.bend(i);
-    return lifted.squaredNorm() > held.squaredNorm() ? lifted : held;
+  Vector3<Scalar> bend(std::size_t i) const { return ways.bend(i); }
+  Vector3<Scalar> otherBend(std::size_t i) const {
+    return StepWays<B, Course, NoSupport, Scalar>{ways.bodies, ways.course, NoSupport{}, ways.h}.bend(i);
   }
 };
 
@@ -137,7 +135,7 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
     std::uint64_t version() const { return list.version(); }
     void follow(const Bodies& all, std::uint32_t i, const Scalar& t, std::vector<Pair>& out) {
       list.follow(i, all.positions(), detail::RestingReaches<Bodies>{all}, all.ids(), travel(i), travel, out,
-                  t, Scalar(t / travel.ways.h));
+                  Scalar(t / travel.ways.h));
     }
   } near{neighbours_, {ways}};
   const ImpactSettings<Scalar> settings{time, h, std::max(config.restitutionThreshold, config.epsilon),

@@ -116,7 +116,7 @@ void ContactStage<Scalar, Layout>::forEachBefore(Visit&& visit) const {
 
 template <Real Scalar, class Layout>
 StepRecord<Scalar> ContactStage<Scalar, Layout>::beforeLast() const {
-  StepRecord<Scalar> sums = record_;
+  StepRecord<Scalar> sums = record_.ofContacts();
   if (firstActed_) {
     sums.add([&](auto&& visit) { forEachBefore(visit); });
   }

@@ -7,9 +7,9 @@
 
 namespace gravel {
 
-/// On the straight way to the place at h; a path that is bent misses that by |a| h^2/8, less than the margin
-/// of what rests where steps resolve anything. What leans on something does not fall, and what is slow comes
-/// near only when it touches: neighbours at rest would else wake each other for ever.
+/// On the straight way to the place at h, and as far beside it as the path bends. What leans on something
+/// does not fall, and what is slow comes near only when it touches: neighbours at rest would else wake each
+/// other for ever.
 template <Real Scalar, class Layout>
 template <class Visit>
 void ContactStage<Scalar, Layout>::forEachApproach(const Bodies& bodies, const Config& config,

@@ -213,8 +213,8 @@ class Space : public Settings<Scalar> {
   /// Writes all that steps depend on, but for hooks and the log. \throws std::runtime_error where it cannot
   void save(const std::string& path) const requires std::is_trivially_copyable_v<Scalar>;
   /// Takes up a saved run: the next steps give the bits that the saved space would have given. Of the last
-  /// one it knows contacts and their impulses, but no impacts, nor what ended in it. Hooks and the log stay
-  /// those of this space. \throws std::runtime_error, std::invalid_argument: it stays as it was
+  /// one it knows contacts and their impulses, but not which were blows, nor what ended in it. Hooks and the
+  /// log stay those of this space. \throws std::runtime_error, std::invalid_argument: it stays as it was
   void restore(const std::string& path) requires std::is_trivially_copyable_v<Scalar>;
 
   // Parts of the collision handling, as the step uses them.

@@ -94,10 +94,10 @@ template <Real Scalar, class Layout>
 std::size_t Space<Scalar, Layout>::addPlane(const Vector& normal, Scalar offset, MaterialId material) {
   this->inStep_.refuse("addPlane()");
   contact_.materials.check(static_cast<std::uint32_t>(material), "the new plane");
-  const Plane<Scalar> plane = makePlane(normal, offset, material);
+  const std::size_t number = contact_.boundaries.add(makePlane(normal, offset, material));
   wakeAll();
   forcesValid_ = false;  // contacts are looked for again before the next step
-  return contact_.boundaries.add(plane);
+  return number;
 }
 
 template <Real Scalar, class Layout>

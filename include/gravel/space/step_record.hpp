@@ -84,6 +84,13 @@ class StepRecord {
     }
   }
 
+  /// The impulses that are recorded here, alone.
+  StepRecord ofContacts() const {
+    StepRecord impulses;
+    impulses.entries_ = entries_;
+    return impulses;
+  }
+
   bool hasParts() const { return parts_ > 1; }
   /// In their order, with times since the start of the step. Of a step in one part there are none here.
   const std::vector<Impact<Scalar>>& impacts() const { return impacts_; }

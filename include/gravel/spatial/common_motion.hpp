@@ -45,6 +45,25 @@ Vector3<S> bendOf(const Travel& travel, std::size_t i) {
   }
 }
 
+/// The square of what it is less `common`, at most: who may go one way or another has an `otherBend(i)`, too.
+template <Real S, class Travel>
+S bendLess_sq(const Travel& travel, std::size_t i, const Vector3<S>& common) {
+  S most = Vector3<S>(bendOf<S>(travel, i) - common).squaredNorm();
+  if constexpr (requires { travel.otherBend(i); }) {
+    most = std::max<S>(most, Vector3<S>(travel.otherBend(i) - common).squaredNorm());
+  }
+  return most;
+}
+/// The same of ways that are seen in the frame of a CommonMotion, or not.
+template <Real S, class Travel>
+S bendOf_sq(const Travel& travel, std::size_t i) {
+  if constexpr (requires { travel.bend_sq(i); }) {
+    return travel.bend_sq(i);
+  } else {
+    return bendLess_sq<S>(travel, i, Vector3<S>::Zero());
+  }
+}
+
 /// No less than its length along each axis in sum, found sooner.
 template <Real S, class Travel>
 [[gnu::always_inline]] inline S mostBendOf(const Travel& travel, std::size_t i) {
@@ -59,7 +78,7 @@ template <Real S, class Travel>
 template <Real S>
 [[gnu::always_inline]] inline S squareOfSum(const S& a_sq, const S& b_sq) {
   using std::sqrt;
-  return b_sq > S(0) ? S(a_sq + b_sq + S(2) * S(sqrt(a_sq)) * S(sqrt(b_sq))) : a_sq;
+  return b_sq == S(0) ? a_sq : S(a_sq + b_sq + S(2) * S(sqrt(a_sq)) * S(sqrt(b_sq)));
 }
 
 /// What n ways have in common, as those of a pile in orbit do: the median of each component among at most 63
@@ -124,11 +143,12 @@ class CommonMotion {
     set(commonWay<S>(n, start), commonWay<S>(n, end));
     bend_ = commonWay<S>(n, [&](std::size_t i) { return bendOf<S>(travel, i); });
   }
-  /// Of ways that begin where all were last seen.
+  /// Of ways that begin where all were last seen; a bend below `least` [m] is none.
   template <class Travel>
-  void findAhead(std::size_t n, const Travel& travel) {
+  void findAhead(std::size_t n, const Travel& travel, const S& least) {
     find(
         n, [](std::size_t /*body*/) { return Vector3<S>(Vector3<S>::Zero()); }, travel, travel);
+    bend_ = sumAbs(bend_) > least ? bend_ : Vector3<S>(Vector3<S>::Zero());
   }
   void clear() {
     set(Vector3<S>::Zero(), Vector3<S>::Zero());
@@ -163,7 +183,7 @@ class CommonMotion {
         Vector3<S> operator()(std::size_t i) const {
           return common.lessThis(Vector3<S>(positions[i]), Vector3<S>(travel(i)));
         }
-        Vector3<S> bend(std::size_t i) const { return bendOf<S>(travel, i) - common.bend_; }
+        S bend_sq(std::size_t i) const { return bendLess_sq<S>(travel, i, common.bend_); }
       };
       return Rest{*this, positions, travel};
     }

@@ -15,9 +15,9 @@ namespace gravel {
 ///
 /// In a shear-periodic box ways are measured against the flow -(3/2) Omega x, in whose frame the images stand
 /// still, and what the flow itself can bring a touching pair nearer is taken off the skin. A list can be
-/// asked to hold for a whole step, along straight ways whose ends are known. A few bodies that leave their
-/// half of the skin, bullets among grains, do not spoil it: each of them is compared with all others, until a
-/// new search is cheaper. Nor does, without shear, what most have in common: a pile in orbit.
+/// asked to hold for a whole step, along ways of which the ends and the bends are known. A few bodies that
+/// leave their half of the skin, bullets among grains, do not spoil it: each of them is compared with all
+/// others, until a new search is cheaper. Nor does, without shear, what most have in common: a pile in orbit.
 template <Real S>
 class NeighbourList {
  public:
@@ -51,8 +51,7 @@ class NeighbourList {
     parallelForTasks(swift_.size(), [&](std::size_t k) {
       swiftPairs_[k].clear();
       detail::compare(swift_[k], positions, radii, ids, detail::wayOf<S>(rest, swift_[k]), rest,
-                      common_.ahead(), S(room_ - skin_), free_, bend_, domain_, now_, S(0), S(0),
-                      swiftPairs_[k]);
+                      common_.ahead(), S(room_ - skin_), free_, bend_, domain_, now_, S(0), swiftPairs_[k]);
     });
     for (std::size_t k = 0; k < swift_.size(); ++k) {
       extra_.insert(extra_.end(), swiftPairs_[k].begin(), swiftPairs_[k].end());
@@ -65,17 +64,16 @@ class NeighbourList {
 
   /// A body has taken another course since the update: appends to `out` the pairs that its new way adds to
   /// those of pairs(). O(1) while it stays in its half of the skin, else O(N).
-  /// \param way [m] from positions[i], as from the update on \param t, share [s] [1] of ways since then
+  /// \param way [m] from positions[i], as from the update on \param share [1] of the ways since then
   template <class Positions, class Radii, class Ids, class Travel>
   void follow(std::uint32_t i, const Positions& positions, const Radii& radii, const Ids& ids,
-              const Vector3<S>& way, const Travel& travel, std::vector<Pair>& out, const S& t = S(0),
-              const S& share = S(0)) {
+              const Vector3<S>& way, const Travel& travel, std::vector<Pair>& out, const S& share = S(0)) {
     if (!(withBend_sq(farthest_sq(i, positions[i], way), i, travel) <= half_ * half_)) {
       ++comparisons_;
       strays_ = true;
       detail::compare(i, positions, radii, ids, common_.lessThis(Vector3<S>(positions[i]), way),
                       common_.lessThis(positions, travel), common_.ahead(), S(room_ - skin_), free_, bend_,
-                      domain_, now_, t, share, out);
+                      domain_, now_, share, out);
     }
   }
 
@@ -210,8 +208,7 @@ class NeighbourList {
   }
   template <class Travel>
   S withBend_sq(const S& farthest_sq, std::size_t i, const Travel& travel) const {
-    return detail::squareOfSum<S>(farthest_sq,
-                                  Vector3<S>(detail::bendOf<S>(travel, i) - common_.bend()).squaredNorm());
+    return detail::squareOfSum<S>(farthest_sq, detail::bendLess_sq<S>(travel, i, common_.bend()));
   }
 
   /// How far a body may get, less what subtraction loses: a few units in its last place.
@@ -256,7 +253,7 @@ class NeighbourList {
     common_.clear();
     if constexpr (!std::is_same_v<Travel, AtRest>) {
       if (domain.omega() == S(0)) {
-        common_.findAhead(n, travel);
+        common_.findAhead(n, travel, S(skin_ / S(8)));
       }
       bend_ += detail::sumAbs(common_.bend());
       skin_ = std::max<S>(

@@ -93,17 +93,17 @@ S skinFor(std::vector<S>& radii, const S& perUpdate) {
 /// \param ahead [1] of CommonMotion, less whose frame these ways are
 /// \param slack [m] added to the sum of the radii
 /// \param free [m] what is left of the skin \param most [m] bend of any
-/// \param t, share [s] [1] of the ways when the image that is nearest is looked at: see Domain::imageAt()
+/// \param share [1] of the ways after which the image that is nearest is looked at: see Domain::imageAt()
 template <Real S, class Positions, class Radii, class Ids, class Travel>
 void compare(std::uint32_t i, const Positions& positions, const Radii& radii, const Ids& ids,
              const Vector3<S>& own, const Travel& travel, const S& ahead, const S& slack, const S& free,
-             const S& most, const Domain<S>& domain, const S& time, const S& t, const S& share,
-             std::vector<Pair>& out) {
+             const S& most, const Domain<S>& domain, const S& time, const S& share, std::vector<Pair>& out) {
   const Vector3<S> x = positions[i];
   Vector3<S> way = own;
   S length_sq = way.squaredNorm();
   using std::sqrt;
-  const S bend = S(sqrt(bendOf<S>(travel, i).squaredNorm()));
+  const S bend = S(sqrt(bendOf_sq<S>(travel, i)));
+  const S t = ahead == S(0) ? S(0) : S(share * ahead / (S(1.5) * domain.omega()));
   const S aside = slack + free + bend + most;
   S widest = aside + S(sqrt(length_sq));
   const S rounded = S(1) + S(16) * roundoff<S>();
@@ -114,10 +114,12 @@ void compare(std::uint32_t i, const Positions& positions, const Radii& radii, co
     if (j == i || !(radii_ij > S(0))) {
       continue;
     }
-    Vector3<S> drift = Vector3<S>::Zero();
     const Vector3<S> way_j = wayOf<S>(travel, j);
-    const Vector3<S> r = domain.imageAt(Vector3<S>(Vector3<S>(positions[j]) - x),
-                                        Vector3<S>(share * (way_j - own)), t, drift, time);
+    const Vector3<S> apart = Vector3<S>(positions[j]) - x;
+    Vector3<S> between = way_j - own;
+    between[1] -= ahead * apart[0];  // with the flow again
+    Vector3<S> drift = Vector3<S>::Zero();
+    const Vector3<S> r = domain.imageAt(apart, Vector3<S>(share * between), t, drift, time);
     if (!(ahead == S(0))) {  // as seen from the flow where j is
       way[1] = own[1] + ahead * r[0];
       length_sq = way.squaredNorm();
@@ -129,7 +131,7 @@ void compare(std::uint32_t i, const Positions& positions, const Radii& radii, co
     if (r.squaredNorm() > S(2) * rounded * (near * near + way_sq)) {
       continue;
     }
-    way_sq = squareOfSum<S>(way_sq, bendOf<S>(travel, j).squaredNorm());
+    way_sq = squareOfSum<S>(way_sq, bendOf_sq<S>(travel, j));
     // Another course may take it anywhere within its half of the skin, which is this far at most.
     const S far = std::max<S>(S(sqrt(way_sq)), free);
     const S reach = radii_ij + slack + bend + far;
@@ -154,7 +156,7 @@ S takeSwift(std::size_t n, std::size_t most, const S& skin, const Travel& travel
   using std::sqrt;
   std::vector<S> ways(n);
   for (std::size_t i = 0; i < n; ++i) {
-    ways[i] = squareOfSum<S>(wayOf<S>(travel, i).squaredNorm(), bendOf<S>(travel, i).squaredNorm());
+    ways[i] = squareOfSum<S>(wayOf<S>(travel, i).squaredNorm(), bendOf_sq<S>(travel, i));
     if (!isFinite(ways[i])) {
       return S(0);  // the search will say which
     }
