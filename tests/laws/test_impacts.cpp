@@ -592,7 +592,7 @@ TEST_CASE("A ball that turns back within a step strikes the ceiling that it reac
   const double rest = h - (up - u) / g;
   for (const bool plane : {true, false}) {
     for (const IntegratorKind kind : {IntegratorKind::VelocityVerlet, IntegratorKind::Yoshida4}) {
-      for (const std::size_t others : {0, 200}) {
+      for (const std::size_t others : {0U, 200U}) {
         SimulationConfig<double> config = plain(h);
         config.coeffRestitution = 1;
         config.integrator = kind;

@@ -320,7 +320,7 @@ TEST_CASE(
 
 // Seen to fail: asked twice where the blow is in the second part, and left at a quarter of the speed.
 TEST_CASE("Who goes on approaching by a hook's velocities is asked once, however many parts the step has") {
-  for (const std::size_t parts : {1, 2, 3}) {
+  for (const std::size_t parts : {1U, 2U, 3U}) {
     for (const double apart : {0.51, 0.57}) {  // met after 0.01 and 0.07 of 0.1 s
       SimulationConfig<double> config = plain(0.1);
       config.coeffRestitution = 1;

@@ -14,12 +14,17 @@ namespace {
 
 thread_local long allowed = -1;  // pieces of memory until there is no more; below 0: as many as are asked for
 
-void* piece(std::size_t bytes) {
+void* pieceOrNone(std::size_t bytes) noexcept {
   void* memory = allowed == 0 ? nullptr : std::malloc(bytes > 0 ? bytes : 1);
+  allowed -= memory != nullptr && allowed > 0 ? 1 : 0;
+  return memory;
+}
+
+void* piece(std::size_t bytes) {
+  void* memory = pieceOrNone(bytes);
   if (memory == nullptr) {
     throw std::bad_alloc();
   }
-  allowed -= allowed > 0 ? 1 : 0;
   return memory;
 }
 
@@ -28,8 +33,12 @@ void* piece(std::size_t bytes) {
 // For this whole program: what is asked for with an alignment of its own is not counted.
 void* operator new(std::size_t bytes) { return piece(bytes); }
 void* operator new[](std::size_t bytes) { return piece(bytes); }
+void* operator new(std::size_t bytes, const std::nothrow_t&) noexcept { return pieceOrNone(bytes); }
+void* operator new[](std::size_t bytes, const std::nothrow_t&) noexcept { return pieceOrNone(bytes); }
 void operator delete(void* memory) noexcept { std::free(memory); }
 void operator delete[](void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, const std::nothrow_t&) noexcept { std::free(memory); }
+void operator delete[](void* memory, const std::nothrow_t&) noexcept { std::free(memory); }
 void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
 

@@ -209,17 +209,17 @@ class ImpactForecast : protected ImpactPast<S> {
   [[gnu::flatten]] void predict(const Scene& scene, const Pair& pair, const S& from, std::size_t number) {
     const auto& [i, j] = pair;
     Vector3<S> r, drift;
-    if ((scene.domain.isOpen() &&
-         !swept_.mayMeet(i, j, scene.domain, scene.settings.time, scene.settings.h, r, drift)) ||
-        isLeftToSolver(scene, i) || isLeftToSolver(scene, j) || !detail::canTouch(scene.bodies, i, j)) {
+    // Where images go no ways of their own none is nearer than that.
+    const bool near = scene.domain.omega() != S(0) ||
+                      swept_.mayMeet(i, j, scene.domain, scene.settings.time, scene.settings.h, r, drift);
+    if (!near || isLeftToSolver(scene, i) || isLeftToSolver(scene, j) || !canTouch(scene.bodies, i, j)) {
       return;
     }
     const ContactKeys keys{scene.bodies.ids()[i], scene.bodies.ids()[j]};
     if (isDecided(i, keys.second)) {
       return;
     }
-    const Flight one = flights_.of(scene, i);
-    const Flight two = flights_.of(scene, j);
+    const Flight one = flights_.of(scene, i), two = flights_.of(scene, j);
     const RelativeFlight<S> flight = flightOf(scene, one, two, from, drift);
     const S reach = one.radius + two.radius;
     const bool held = isHeld(scene, i, j, keys, number);

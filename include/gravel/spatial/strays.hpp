@@ -34,7 +34,7 @@ struct Wandering {
     swift.clear();
     const auto isNear = [&](std::size_t i, const S& d_sq) {
       const S left = within - mostBend(i);
-      return (left >= S(0)) & (d_sq <= left * left);
+      return d_sq <= left * sizeOf(left);
     };
     // Mostly all are near: first a loop without branches.
     bool near = true;
@@ -116,10 +116,13 @@ void compare(std::uint32_t i, const Positions& positions, const Radii& radii, co
     }
     const Vector3<S> way_j = wayOf<S>(travel, j);
     const Vector3<S> apart = Vector3<S>(positions[j]) - x;
-    Vector3<S> between = way_j - own;
-    between[1] -= ahead * apart[0];  // with the flow again
-    Vector3<S> drift = Vector3<S>::Zero();
-    const Vector3<S> r = domain.imageAt(apart, Vector3<S>(share * between), t, drift, time);
+    const auto nearestThen = [&] {
+      Vector3<S> between = way_j - own;
+      between[1] -= ahead * apart[0];  // with the flow again
+      Vector3<S> drift = Vector3<S>::Zero();
+      return domain.imageAt(apart, Vector3<S>(share * between), t, drift, time);
+    };
+    Vector3<S> r = t > S(0) ? nearestThen() : domain.minimumImage(apart, time);
     if (!(ahead == S(0))) {  // as seen from the flow where j is
       way[1] = own[1] + ahead * r[0];
       length_sq = way.squaredNorm();
@@ -130,6 +133,9 @@ void compare(std::uint32_t i, const Positions& positions, const Radii& radii, co
     const S near = radii_ij + widest;
     if (r.squaredNorm() > S(2) * rounded * (near * near + way_sq)) {
       continue;
+    }
+    if (share > S(0) && !(t > S(0))) {  // where images go no ways of their own none is nearer than that
+      r = nearestThen();
     }
     way_sq = squareOfSum<S>(way_sq, bendOf_sq<S>(travel, j));
     // Another course may take it anywhere within its half of the skin, which is this far at most.
