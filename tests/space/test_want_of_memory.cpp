@@ -30,7 +30,8 @@ void* piece(std::size_t bytes) {
 
 }  // namespace
 
-// For this whole program: what is asked for with an alignment of its own is not counted.
+// For this whole program, which has no other tests: what is asked for with an alignment of its own is not
+// counted.
 void* operator new(std::size_t bytes) { return piece(bytes); }
 void* operator new[](std::size_t bytes) { return piece(bytes); }
 void* operator new(std::size_t bytes, const std::nothrow_t&) noexcept { return pieceOrNone(bytes); }
