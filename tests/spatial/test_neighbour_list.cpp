@@ -31,6 +31,16 @@ IdPairs fresh(const Cloud<S>& cloud, const S& margin, const Domain<S>& domain, c
   return named(pairs, cloud);
 }
 
+/// The smaller index of each pair first.
+std::vector<std::pair<std::uint32_t, std::uint32_t>> sortedIndices(const std::vector<Pair>& pairs) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> sorted;
+  for (const Pair& pair : pairs) {
+    sorted.emplace_back(std::min(pair.first, pair.second), std::max(pair.first, pair.second));
+  }
+  std::sort(sorted.begin(), sorted.end());
+  return sorted;
+}
+
 }  // namespace
 
 TEMPLATE_TEST_CASE("over a long random walk the list holds the pairs of a fresh search at every step", "",
@@ -279,11 +289,7 @@ TEST_CASE("a list for a whole way in a sheared box counts ways against the flow,
             late);
       }
       list.add(late, cloud.ids);
-      std::vector<std::pair<std::uint32_t, std::uint32_t>> known;
-      for (const Pair& pair : list.pairs()) {
-        known.emplace_back(std::min(pair.first, pair.second), std::max(pair.first, pair.second));
-      }
-      std::sort(known.begin(), known.end());
+      const auto known = sortedIndices(list.pairs());
       for (std::uint32_t i = 0; i < cloud.size(); ++i) {
         for (std::uint32_t j = i + 1; j < cloud.size(); ++j) {
           const auto [r, way] = image(i, j);
@@ -331,11 +337,7 @@ TEST_CASE("a list for a whole way misses no pair that meets where paths bend") {
           course.bends[i] += kind == 1 ? Vector3<double>(0, 0, 0.3) : Vector3<double>(0, 0, 0);
         }
         list.update(cloud.positions, cloud.radii, cloud.ids, 0, domain, 0.0, 0.0, course, 1.0);
-        std::vector<std::pair<std::uint32_t, std::uint32_t>> known;
-        for (const Pair& pair : list.pairs()) {
-          known.emplace_back(std::min(pair.first, pair.second), std::max(pair.first, pair.second));
-        }
-        std::sort(known.begin(), known.end());
+        const auto known = sortedIndices(list.pairs());
         for (std::uint32_t i = 0; i < 300; ++i) {
           for (std::uint32_t j = i + 1; j < 300; ++j) {
             const Vector3<double> r = domain.minimumImage(cloud.positions[j] - cloud.positions[i], 0.0);
@@ -394,11 +396,7 @@ TEST_CASE("a list misses no image that is beside what turns off late on its way"
         list.follow(i, cloud.positions, cloud.radii, cloud.ids, ways[i], travel, late, share);
       }
       list.add(late, cloud.ids);
-      std::vector<std::pair<std::uint32_t, std::uint32_t>> known;
-      for (const Pair& pair : list.pairs()) {
-        known.emplace_back(std::min(pair.first, pair.second), std::max(pair.first, pair.second));
-      }
-      std::sort(known.begin(), known.end());
+      const auto known = sortedIndices(list.pairs());
       for (std::uint32_t i = 0; i < cloud.size(); ++i) {
         for (std::uint32_t j = i + 1; j < cloud.size(); ++j) {
           Vector3<double> r = cloud.positions[j] - cloud.positions[i] + share * (ways[j] - ways[i]);
