@@ -50,12 +50,16 @@ void forAllParts(const ContactColoring& colouring, F&& f) {
 
 /// As sumOverParts() over all rows but the lone ones, blocks from the first one on side by side, then colour
 /// after colour, and the overflow one by one.
-template <class T, class F>
-T sumOverColourParts(const ContactColoring& colouring, const T& zero, F&& f, std::size_t first = 0) {
+/// \param wanted  called with each block, counted from the first one: whether to visit its rows
+template <class T, class F, class Wanted>
+T sumOverColourParts(const ContactColoring& colouring, const T& zero, F&& f, std::size_t first,
+                     Wanted&& wanted) {
   T sum = orderedSum(colouring.blocks() - first, 1, zero, [&](std::size_t block, std::size_t /*next*/) {
     T part = zero;
-    for (const ContactColoring::Part& rows : colouring.coloursOf(first + block)) {
-      f(std::size_t{rows.begin}, std::size_t{rows.end}, part);
+    if (wanted(block)) {
+      for (const ContactColoring::Part& rows : colouring.coloursOf(first + block)) {
+        f(std::size_t{rows.begin}, std::size_t{rows.end}, part);
+      }
     }
     return part;
   });
@@ -69,10 +73,20 @@ T sumOverColourParts(const ContactColoring& colouring, const T& zero, F&& f, std
   return sum;
 }
 
-/// The same without the rows of small islands.
+/// The same with every block.
+template <class T, class F>
+T sumOverColourParts(const ContactColoring& colouring, const T& zero, F&& f) {
+  return sumOverColourParts(colouring, zero, f, 0, [](std::size_t) { return true; });
+}
+
+/// The same without the rows of small islands; \param wanted  of blocks of bodies
+template <class T, class F, class Wanted>
+T sumOverLargeParts(const ContactColoring& colouring, const T& zero, F&& f, Wanted&& wanted) {
+  return sumOverColourParts(colouring, zero, f, colouring.bundles(), wanted);
+}
 template <class T, class F>
 T sumOverLargeParts(const ContactColoring& colouring, const T& zero, F&& f) {
-  return sumOverColourParts(colouring, zero, f, colouring.bundles());
+  return sumOverLargeParts(colouring, zero, f, [](std::size_t) { return true; });
 }
 
 }  // namespace detail

@@ -77,6 +77,8 @@ class ContactColoring {
   /// none where bodies are few.
   std::size_t blocks() const { return ends_.size(); }
   std::size_t bundles() const { return islands_.bundles(); }
+  /// The number, among the blocks of bodies where there are any, of that of a slot.
+  static std::size_t blockOf(std::uint32_t slot) { return slot / blockSize; }
   /// The colours within a block.
   std::span<const Part> coloursOf(std::size_t block) const {
     const std::size_t first = block == 0 ? 0 : ends_[block - 1];
@@ -180,7 +182,7 @@ class ContactColoring {
     constexpr std::uint64_t all = (std::uint64_t{1} << maxColours) - 1;
     used_.assign(movable_.size(), 0);
     detail::resizeSparingly(group_, byContact_.size());
-    places_.assign(staticSlot() / blockSize + 1, Places{});
+    places_.assign(blockOf(staticSlot()) + 1, Places{});
     bundled_.assign(bundles(), {});
     colours_ = 0;
     const bool inBlocks = staticSlot() > fewBodies;
@@ -189,7 +191,7 @@ class ContactColoring {
       if (k > 0 && slot1 < byContact_[k - 1].slot1) {
         detail::refuse("place of a contact", std::to_string(k), "that in the order of keys");
       }
-      const std::uint32_t block = slot1 / blockSize;
+      const std::size_t block = blockOf(slot1);
       group_[k] = lone;
       if (degree_[slot1] > 1 || degree_[slot2] > 1) {
         const std::uint64_t free = ~(used_[slot1] | used_[slot2]) & all;
@@ -206,7 +208,7 @@ class ContactColoring {
             ++places_[block][inBundle];
             continue;
           }
-          const bool within = inBlocks && (movable_[slot2] == 0 || slot2 / blockSize == block);
+          const bool within = inBlocks && (movable_[slot2] == 0 || blockOf(slot2) == block);
           group_[k] = static_cast<std::uint8_t>(within ? colour : maxColours + colour);
         }
       }

@@ -9,6 +9,7 @@
 #include <gravel/contact/correction_settings.hpp>
 #include <gravel/contact/overlap_lanes.hpp>
 #include <gravel/contact/row_watch.hpp>
+#include <gravel/contact/stirred_blocks.hpp>
 #include <gravel/core/memory.hpp>
 #include <gravel/core/parallel.hpp>
 
@@ -65,6 +66,7 @@ class PositionalCorrection {
         colouring.bundles(), 1, Opened{}, [&](std::size_t bundle, std::size_t /*next*/) {
           return openBundle(contacts, colouring, bundle, settings);
         });
+    stirred_.begin(colouring);
     Course course{enough, settings.maxIterations};
     bool goesOn = true;
     while (goesOn) {
@@ -87,7 +89,8 @@ class PositionalCorrection {
       };
       // Lone contacts are right after one sweep.
       Opened opened = detail::sumOverParts(0, colouring.loneCount(), Opened{}, open);
-      opened += detail::sumOverLargeParts(colouring, Opened{}, open);
+      opened += detail::sumOverLargeParts(colouring, Opened{}, open,
+                                          [&](std::size_t block) { return stirred_.visit(block); });
       report.residual = std::max<S>(opened.largest, ofIslands.largest);
       report.loss += opened.loss;
       goesOn = course.goesOn(opened.largest);
@@ -273,12 +276,14 @@ class PositionalCorrection {
     b1.store(shifts_, group.slot1, settings.keepAngularMomentum);
     b2.store(shifts_, group.slot2, settings.keepAngularMomentum);
     for (std::size_t lane = 0; lane < group.count; ++lane) {
-      if (opened.way1[lane] > S(0)) {
-        watch_.move(group.slot1[lane], opened.way1[lane]);
-      }
-      if (opened.way2[lane] > S(0)) {
-        watch_.move(group.slot2[lane], opened.way2[lane]);
-      }
+      const auto move = [&](std::uint32_t slot, const S& way) {
+        if (way > S(0)) {
+          watch_.move(slot, way);
+          stirred_.stir(slot);
+        }
+      };
+      move(group.slot1[lane], opened.way1[lane]);
+      move(group.slot2[lane], opened.way2[lane]);
       watch_.enter(group.row[lane], group.slot1[lane], group.slot2[lane]);
     }
     tell(opened.missing, opened.loss);
@@ -286,6 +291,7 @@ class PositionalCorrection {
 
   std::vector<Body> shifts_;  ///< by slot; the last one is the boundary
   detail::RowWatch<S> watch_;
+  detail::StirredBlocks stirred_;
   std::vector<std::uint8_t> deep_;  ///< by contact: more than hardly any overlap
   std::vector<std::size_t> ends_;   ///< by part of the slots, in the list of those moved
   std::vector<Displacement<S>> moved_;
