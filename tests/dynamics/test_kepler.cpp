@@ -137,6 +137,22 @@ TEST_CASE("At the very centre nothing is finite, and the search for whole turns 
   }
 }
 
+// h / r is below the smallest number: a straight way. Seen to fail: the search for a time beyond the root
+// began with none, and doubled it without end; in float the square of the distance was not a number.
+TEST_CASE("A flight past so far away that an instant is no angle ends, and is straight") {
+  Vec dx, dv;
+  keplerIncrements<double>(Vec(1e150, 0, 0), Vec(0, 1, 0), 1.0, 1e-180, dx, dv);
+  CHECK(dx == Vec(0, 1e-180, 0));
+  CHECK(dv == Vec::Zero());
+  using Vec32 = Vector3<float>;
+  for (const float h : {1e-30f, -1e-30f, 1.0f}) {
+    Vec32 x, v;
+    keplerIncrements<float>(Vec32(1e20f, 0, 0), Vec32(0, 2, 0), 1.0f, h, x, v);
+    CHECK(x == Vec32(0, 2 * h, 0));
+    CHECK(v == Vec32::Zero());
+  }
+}
+
 // Seen to fail: a body whose energy is no number, or too large for one, stood still, and whole turns of a
 // time near the largest number, or of an infinite one, were looked for without end.
 TEST_CASE("What is not finite, or has a square that is not, gives NaN; the longest time ends") {

@@ -3,6 +3,7 @@
 /// \file
 /// A few points that nothing but their forces moves, carried through many steps outside of their storage.
 
+#include <gravel/core/rounded.hpp>
 #include <gravel/dynamics/compensation.hpp>
 #include <gravel/dynamics/integrator_tables.hpp>
 
@@ -127,13 +128,13 @@ class FewPoints {
     const std::size_t end = 3 * stride_;
     if (!carries_) {
       for (std::size_t k = 0; k < end; k += 2) {
-        sums.put(k, sums.pack(k) + rates.pack(k) * time);
+        sums.put(k, sums.pack(k) + detail::rounded<Pack>(rates.pack(k) * time));
       }
       return;
     }
     for (std::size_t k = 0; k < end; k += 2) {
       const Pack sum = sums.pack(k);
-      const Pack more = rates.pack(k) * time + lows.pack(k);
+      const Pack more = detail::rounded<Pack>(rates.pack(k) * time) + lows.pack(k);
       const Pack next = sum + more;
       const Pack part = next - sum;
       lows.put(k, (sum - (next - part)) + (more - part));

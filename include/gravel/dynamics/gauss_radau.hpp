@@ -58,7 +58,7 @@ class GaussRadau15 {
     Scalar done(0);
     int stuck = 0;  // steps in a row that cannot be shorter
     Scalar wanted = last_.next > Scalar(0) ? last_.next : firstStep(bodies, h);
-    while (done < h) {
+    while (done < h && !bodies.empty()) {
       const Scalar rest = h - done;
       const bool last = !(wanted < rest);
       const Scalar dt = last ? rest : rest < Scalar(2) * wanted ? Scalar(rest / Scalar(2)) : wanted;
@@ -153,8 +153,10 @@ class GaussRadau15 {
 
   template <class Layout, class Target>
   static void takeAccelerations(const Bodies<Scalar, Layout>& bodies, Target&& a) {
+    const Vector3<Scalar> none = Vector3<Scalar>::Zero();  // of a fixed one, whatever the forces say
     for (std::size_t i = 0; i < bodies.size(); ++i) {
-      a.template segment<3>(static_cast<Eigen::Index>(3 * i)) = bodies.accelerations()[i].array();
+      const Vector3<Scalar> given = bodies[i].isFixed() ? none : Vector3<Scalar>(bodies.accelerations()[i]);
+      a.template segment<3>(static_cast<Eigen::Index>(3 * i)) = given.array();
     }
   }
 
@@ -190,8 +192,7 @@ class GaussRadau15 {
     predict(dt);
     const Scalar dt_sq = dt * dt;
     const Scalar half = Scalar(1) / Scalar(2);
-    Scalar before(0);
-    Scalar size(0);
+    Scalar before(0), size(0);
     for (int iteration = 1; iteration <= 12; ++iteration) {
       Scalar change(0);
       size = Scalar(0);
@@ -312,9 +313,7 @@ class GaussRadau15 {
   Columns F_;                   // a - a0 at the nodes
   Columns eNext_;               // coefficients as predicted now
   Scalar eta_ = Scalar(0.175);  // (5040e-9)^(1/7)
-  std::size_t taken_ = 0;
-  std::size_t rejected_ = 0;
-  std::size_t iterations_ = 0;
+  std::size_t taken_ = 0, rejected_ = 0, iterations_ = 0;
 };
 
 }  // namespace gravel

@@ -275,8 +275,10 @@ class Hermite4 {
     const Scalar fast = product(d_sq[1], d_sq[3]) + d_sq[2];
     const Scalar twice = Scalar(2) * dt;
     const bool mayDouble = level > 0 && (next & (ticks(Level(level - 1)) - 1)) == 0;
-    // A step cut far below what was wanted is too short for differences of third order: it says nothing new.
-    if (!(dt * Scalar(64) < s_.wanted[row])) {
+    // Third differences over a step far below what was wanted are rounding: no news while that lasts.
+    if (dt * Scalar(64) < s_.wanted[row]) {
+      s_.wanted[row] -= dt;
+    } else {
       s_.wanted[row] = fast * Scalar(4) < eta_ * slow || !(fast > Scalar(0))
                            ? twice
                            : Scalar(dt * sqrt(Scalar(eta_ * slow / fast)));

@@ -25,12 +25,15 @@ struct HermiteState {
   std::vector<std::uint32_t> movable;  ///< rows
   std::size_t sources = 0;             ///< rows with mass
 
-  /// Of `bodies`. \return true if they are as they were left, false if all but places, velocities and masses
-  /// is to be found anew
+  /// Of `bodies`, of which nothing is known from here on until remember(): who throws on the way leaves rows
+  /// at several times. \return true if they are as they were left, false if all but places, velocities and
+  /// masses is to be found anew
   template <class Layout>
   bool read(const Bodies<Scalar, Layout>& bodies) {
     const std::size_t n = bodies.size();
-    if (isLeftAs(bodies)) {
+    const bool known = isLeftAs(bodies);
+    left_.clear();
+    if (known) {
       return true;
     }
     order(bodies);

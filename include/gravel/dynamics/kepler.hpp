@@ -3,7 +3,7 @@
 /// \file
 /// Motion about a centre of attraction, solved for any orbit and any time: universal variables.
 
-#include <gravel/core/types.hpp>
+#include <gravel/core/sizes.hpp>
 
 #include <algorithm>
 
@@ -55,7 +55,7 @@ template <Real Scalar>
 void keplerIncrements(const Vector3<Scalar>& x, const Vector3<Scalar>& v, const Scalar& GM, Scalar h,
                       Vector3<Scalar>& dx, Vector3<Scalar>& dv) {
   using std::sqrt;
-  const Scalar r0 = sqrt(Scalar(x.squaredNorm()));
+  const Scalar r0 = detail::safeNorm(x);
   const Scalar eta = x.dot(v);
   const Scalar beta = Scalar(2) * GM / r0 - v.squaredNorm();
   const Scalar zeta = GM - beta * r0;
@@ -89,7 +89,7 @@ void keplerIncrements(const Vector3<Scalar>& x, const Vector3<Scalar>& v, const 
     // From where the orbit has hardly bent, doubled until it is beyond the root.
     const Scalar bend = beta < Scalar(0) ? Scalar(Scalar(1) / sqrt(-beta)) : Scalar(r0 / sqrt(GM));
     const Scalar sign = h > Scalar(0) ? Scalar(1) : Scalar(-1);
-    Scalar reach = sign * std::min<Scalar>(sign * s, bend);
+    Scalar reach = sign * (sign * s > Scalar(0) ? std::min<Scalar>(sign * s, bend) : bend);
     const auto time = [&](const Scalar& at) {
       const detail::Stumpff<Scalar> c(beta * at * at);
       return Scalar(r0 * at + eta * at * at * c.c2 + zeta * at * at * at * c.c3);

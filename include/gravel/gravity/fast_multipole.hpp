@@ -22,7 +22,7 @@ namespace gravel {
 ///
 /// Cost: O(N) but for the sort; memory about 300 bytes a body at the default tolerance. The
 /// result is a function of the input alone: not of earlier calls, nor of the number of threads. One object
-/// serves one caller at a time; up to 2^32 - 1 bodies.
+/// serves one caller at a time; up to 2^32 - 65 bodies.
 ///
 /// In a domain that is not open the images of all bodies pull too; see setDomain.
 template <Real S>
@@ -106,14 +106,15 @@ class FastMultipole {
   using F = detail::AtLeastDouble<S>;
 
   static constexpr std::uint32_t leafSize = 64;
-  static constexpr std::size_t mostBodies = std::numeric_limits<std::uint32_t>::max();
+  static constexpr std::size_t mostBodies =
+      std::numeric_limits<std::uint32_t>::max() - 64;  // rows are counted in packets
 
   template <class Positions, class Masses>
   void evaluate(const Positions& positions, const Masses& masses, const S& G, const S& softening,
                 bool withPotential, bool onlyWanted = false) {
     if (positions.size() > mostBodies) {
       detail::refuse("number of bodies of a fast multipole sum", std::to_string(positions.size()),
-                     "at most 2^32 - 1");
+                     "at most 2^32 - 65");
     }
     units_ = detail::GravityUnits<S>(positions, masses, G, softening, images_.box());
     images_.prepare(units_.perLength(), units_.low(), units_.high(), tolerance_);

@@ -49,8 +49,12 @@ struct FewBodies {
     const Pack ofItself(e + S(1), e);
     const Pack ofLast(e, n % 2 == 0 ? e : S(e + S(1)));
     Pack least = Pack::Constant(S(1));
-    Pack total = Pack::Zero();  // what is not finite stays in it
-    S behind[most][3];          // the pull of those behind
+    // What is not finite stays in it.
+    Pack total = Pack::Zero();
+    if (n == 1) {  // else each is in a pair
+      total = x.pack(0) * S(0) + y.pack(0) * S(0) + z.pack(0) * S(0) + e;
+    }
+    S behind[most][3];  // the pull of those behind
     for (std::size_t i = 0; i < n; ++i) {
       const Pack x_i = Pack::Constant(x.at[i]);
       const Pack y_i = Pack::Constant(y.at[i]);

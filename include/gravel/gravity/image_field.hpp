@@ -68,6 +68,8 @@ class ImageField {
         moments[k] += parts[c][k];
       }
     }
+    mass_ = squares_ = F(0);
+    first_.setZero();
     if (background_ > F(0) && !slabs_.empty()) {
       const std::vector<F>& moments = moments_[0];
       squares_ = moments[terms];

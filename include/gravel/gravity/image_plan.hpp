@@ -16,6 +16,8 @@ struct ImagePlan {
   double reach;      ///< images are near within so many diagonals of the box
   int order;
   double flat;  ///< see PeriodicImages::isDeep
+
+  friend bool operator==(const ImagePlan&, const ImagePlan&) = default;
 };
 
 /// Of the slabs of a deep patch, in diagonals of its plane. Bodies of two that touch are apart by at most

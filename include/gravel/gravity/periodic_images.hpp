@@ -108,26 +108,26 @@ class PeriodicImages {
       }
     }
     const Key key{edges[0], edges[1], isPlane() ? S(0) : edges[2], depth, offset};
-    if (order_ == plan.order && key == key_ && kind_ == domain_.kind() && isDeep_ == isDeep) {
+    if (plan_ == plan && key == key_ && kind_ == domain_.kind() && isDeep_ == isDeep) {
       tabulate(span);
       return;
     }
     isDeep_ = isDeep;
     perUnit_ = F(1) / F(height);
-    key_ = key;
+    key_ = Key{};  // until all is found
     kind_ = domain_.kind();
-    order_ = plan.order;
-    planReach_ = plan.reach;
+    plan_ = plan;
     reach_sq_ = (edges[0] * edges[0] + edges[1] * edges[1] + depth * depth) * S(plan.reach * plan.reach);
     find();
     above_.clear();
+    key_ = key;
     tabulate(span);
   }
 
   /// Of near images, in the unit of `prepare`: first that of the box itself, then s, -s, s', -s' ...
   const std::vector<Vector3<S>>& shifts() const { return shifts_; }
 
-  int order() const { return order_; }
+  int order() const { return plan_.order; }
   /// (2 pi / 3 V), the background's share of a pair; 0 where there is none.
   const F& background() const { return background_; }
   /// The potential of a unit mass's own far images.
@@ -204,17 +204,17 @@ class PeriodicImages {
   ///     (reach^2 + (n h/d)^2)^(1/2 order(n)) = reach^order,  and two orders more as there are odd ones.
   int orderAt(const F& slabs) const {
     const double part = slabHeight * slabHeight / (1 + slabHeight * slabHeight);
-    const F reach_sq = F(planReach_ * planReach_);
+    const F reach_sq = F(plan_.reach * plan_.reach);
     const F ratio_sq = reach_sq + F(part) * slabs * slabs;
     F enough(1);
-    for (int n = 0; n < order_; ++n) {
+    for (int n = 0; n < plan_.order; ++n) {
       enough *= reach_sq;
     }
     int order = 2;
-    for (F product(1); product < enough && order < order_; product *= ratio_sq) {
+    for (F product(1); product < enough && order < plan_.order; product *= ratio_sq) {
       ++order;
     }
-    return std::min(order, order_);
+    return std::min(order, plan_.order);
   }
 
   std::vector<F> derivativesAbove(const F& slabs, int order) const {
@@ -291,10 +291,10 @@ class PeriodicImages {
       return Vector3<F>(Vector3<F>(F(v[0]), F(v[1]), F(v[2])) * perUnit_);
     };
     if (isPlane()) {
-      derivatives_ = Sums::plane(wide(a_), wide(b_), order_, bound, near);
+      derivatives_ = Sums::plane(wide(a_), wide(b_), plan_.order, bound, near);
       background_ = F(0);
     } else {
-      derivatives_ = Sums::space(wide(edges), order_, bound, near);
+      derivatives_ = Sums::space(wide(edges), plan_.order, bound, near);
       background_ = F(2) * pi<F>() / (F(3) * F(edges[0]) * F(edges[1]) * F(edges[2]));
     }
   }
@@ -305,13 +305,12 @@ class PeriodicImages {
   DomainKind kind_ = DomainKind::Open;
   Vector3<S> a_ = Vector3<S>::Zero(), b_ = Vector3<S>::Zero(), c_ = Vector3<S>::Zero();
   S reach_sq_ = S(0);
-  int order_ = 0;
   std::vector<Vector3<S>> shifts_{Vector3<S>(Vector3<S>::Zero())};
   std::vector<F> derivatives_;
   F background_ = F(0);
   F centre_ = F(0);  ///< z around which bodies lie that are in one slab
   bool isDeep_ = false;
-  double planReach_ = 0;
+  ImagePlan plan_{};
   F low_ = F(0);  ///< z where the lowest slab begins
   F perUnit_ = F(1);
   std::vector<std::vector<F>> above_;  ///< derivatives seen from 1, 2, ... slabs above
