@@ -62,11 +62,11 @@ class PositionalCorrection {
         watch_.enterFirst(k, deep_[colouring.rows()[k].contact] == 0);
       }
     });
+    stirred_.begin(colouring);
     const Opened ofIslands = orderedSum<Share::AsFree>(
         colouring.bundles(), 1, Opened{}, [&](std::size_t bundle, std::size_t /*next*/) {
           return openBundle(contacts, colouring, bundle, settings);
         });
-    stirred_.begin(colouring);
     Course course{enough, settings.maxIterations};
     bool goesOn = true;
     while (goesOn) {
