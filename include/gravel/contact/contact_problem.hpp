@@ -58,6 +58,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
   bool passes = false;
   std::size_t looks = 0;  ///< at rows, to find `wrong_sq`
   bool kept = false;      ///< said by who solves: the impulses of the last problem are those of this one
+  bool bends = false;     ///< the way that follows does: targets are relative to what it changes by half
 
   /// Takes up bodies and contacts, and the first guess of the impulses with what it does to the bodies.
   /// \param dt [s] step that these contacts stand for, >= 0
@@ -166,6 +167,15 @@ class ContactProblem : public detail::ProblemBodies<S> {
   /// Whether what friction alone holds counts beside such a change, and for how much row k then does.
   bool mayHold(const S& approach) const;
   S heldAt(std::size_t k, const ContactColoring& colouring) const;
+  /// Half of what the bend of their ways does to the velocities of pairs until the end of the step.
+  [[gnu::always_inline]] inline detail::PackedVector<S> bendOf(const ContactColoring& colouring,
+                                                               const Group& group) const;
+  /// What that does to slips. \param bend of bendOf() \param b1,b2 of `initial`
+  [[gnu::always_inline]] inline detail::PackedVector<S> slipByBend(const Lanes& row,
+                                                                   const detail::PackedVector<S>& bend,
+                                                                   const detail::BodyLanes<S>& b1,
+                                                                   const detail::BodyLanes<S>& b2) const;
+
   /// Rows [begin, end), which are all of their bodies, get no impulse.
   void release(const ContactColoring& colouring, std::size_t begin, std::size_t end);
 
@@ -241,18 +251,6 @@ class ContactProblem : public detail::ProblemBodies<S> {
                                       const detail::BodyLanes<S>& b1, const detail::BodyLanes<S>& b2,
                                       Taken& sum);
 
-  /// Half of what the bend of their ways does to the velocities of pairs until the end of the step.
-  template <class B>
-  [[gnu::always_inline]] inline detail::PackedVector<S> bendOf(const Taking<B>& taking,
-                                                               const Group& group) const;
-
-  /// What that does to slips. \param bend of bendOf()
-  template <class B>
-  [[gnu::always_inline]] inline detail::PackedVector<S> slipByBend(const Taking<B>& taking, const Lanes& row,
-                                                                   const detail::PackedVector<S>& bend,
-                                                                   const detail::BodyLanes<S>& b1,
-                                                                   const detail::BodyLanes<S>& b2) const;
-
   /// Drifts of second sides.
   template <class B>
   [[gnu::always_inline]] inline detail::PackedVector<S> driftsOf(const Taking<B>& taking,
@@ -308,7 +306,8 @@ class ContactProblem : public detail::ProblemBodies<S> {
   detail::ImpulseList<S>* impulses_ = nullptr;    ///< of this problem, in its own units
   const detail::ImpulseList<S>* last_ = nullptr;  ///< while it is solved
   S ratio_ = S(0);
-  S step_ = S(0);  ///< [s]
+  S step_ = S(0);   ///< [s]
+  S angle_ = S(0);  ///< half of that by which the frame turns spins on the way, if it `bends`
 };
 
 }  // namespace gravel

@@ -28,6 +28,8 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   last_ = &last;
   ratio_ = ratio;
   step_ = dt;
+  bends = way.follows && !way.bend.empty();
+  angle_ = way.frame * dt / S(2);
   this->mostLoad_ = Eigen::NumTraits<S>::highest();
   kept = false;
   detail::resizeSparingly(rows, contacts.size());
@@ -185,16 +187,15 @@ inline S ContactProblem<S>::aim(const Taking<B>& taking, const Group& group, Lan
   const Pack v_n = present + drift;
   const Pack speed = sizeOf(v_n);
   const detail::TurningPair<S> turned = turningOf(taking, group, row, b1, b2, drifts);
-  const bool bends = taking.way.follows && !taking.way.bend.empty();
   detail::PackedVector<S> slip = detail::PackedVector<S>::zero();
   if (taking.way.follows) {
     allowed = allowed + turned.approach;
     slip = turned.slip;
   }
   if (bends) {  // from here on it may be less than none: they part, to be drawn together on the way
-    const detail::PackedVector<S> bend = bendOf(taking, group);
+    const detail::PackedVector<S> bend = bendOf(taking.colouring, group);
     allowed = allowed + row.n.dot(bend);
-    slip = slip - slipByBend(taking, row, bend, b1, b2);
+    slip = slip - slipByBend(row, bend, b1, b2);
   }
   // In a heap at rest relative accelerations vanish, and what a step brings is passed on by the others:
   // there no more than a fall of the step is rest.

@@ -21,30 +21,27 @@
 namespace gravel {
 
 template <Real S>
-template <class B>
-inline auto ContactProblem<S>::bendOf(const Taking<B>& taking, const Group& group) const
+inline auto ContactProblem<S>::bendOf(const ContactColoring& colouring, const Group& group) const
     -> detail::PackedVector<S> {
   const auto part = [&](Eigen::Index c) {
     return Pack::of([&](std::size_t lane) {
-      return S(Base::bendAt(taking.colouring, group.slot2[lane])[c] -
-               Base::bendAt(taking.colouring, group.slot1[lane])[c]);
+      return S(Base::bendAt(colouring, group.slot2[lane])[c] - Base::bendAt(colouring, group.slot1[lane])[c]);
     });
   };
   const detail::PackedVector<S> bend{part(0), part(1), part(2)};
-  return speedIn(Pack::all(S(taking.dt / S(2)))) * bend;
+  return speedIn(Pack::all(S(step_ / S(2)))) * bend;
 }
 
 template <Real S>
-template <class B>
-inline auto ContactProblem<S>::slipByBend(const Taking<B>& taking, const Lanes& row,
-                                          const detail::PackedVector<S>& bend, const detail::BodyLanes<S>& b1,
+inline auto ContactProblem<S>::slipByBend(const Lanes& row, const detail::PackedVector<S>& bend,
+                                          const detail::BodyLanes<S>& b1,
                                           const detail::BodyLanes<S>& b2) const -> detail::PackedVector<S> {
   const detail::PackedVector<S> along = bend - row.n.dot(bend) * row.n;
   if (!friction) {
     return along;
   }
   const detail::PackedVector<S> w = row.c1 * b1.s + row.c2 * b2.s;
-  const Pack angle = Pack::all(S(taking.way.frame * taking.dt / S(2)));
+  const Pack angle = Pack::all(angle_);
   const detail::PackedVector<S> turned{angle * w.y, -angle * w.x, Pack::zero()};
   return along - turned.cross(row.n);
 }
