@@ -34,9 +34,9 @@ class ImpactHistories {
   /// To be changed.
   History& at(std::uint32_t body) {
     if (place_[body] == none) {
-      place_[body] = static_cast<std::uint32_t>(all_.size());
+      struck_.push_back(body);  // first, so that forget() finds it whatever happens
       all_.emplace_back();
-      struck_.push_back(body);
+      place_[body] = static_cast<std::uint32_t>(all_.size() - 1);
     }
     return all_[place_[body]];
   }

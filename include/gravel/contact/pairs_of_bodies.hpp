@@ -26,13 +26,14 @@ class PairsOfBodies {
       refuse("number of pairs that may meet", std::to_string(pairs.size()), "below 2^32 - 1");
     }
     const auto count = static_cast<std::uint32_t>(pairs.size());
-    first_.assign(bodies, count);
+    first_.clear();  // bodies() are none until there is room for all
     start_.assign(bodies + 1, 0);
     for (const Pair& pair : pairs) {
       ++start_[pair.second];
     }
     std::partial_sum(start_.begin(), start_.end(), start_.begin());
     resizeAnew(asSecond_, count);
+    first_.assign(bodies, count);
     for (std::uint32_t k = count; k-- > 0;) {
       first_[pairs[k].first] = k;
       asSecond_[--start_[pairs[k].second]] = k;

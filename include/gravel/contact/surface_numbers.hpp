@@ -12,8 +12,9 @@
 
 namespace gravel::detail {
 
-/// Surfaces numbered from 0 as they appear, named by two numbers and a drift; each is mixed once. A hash
-/// table, O(1) a question.
+/// Surfaces numbered from 0 as they appear, named by two numbers and a drift; each is mixed once, but for a
+/// scalar of which equal is not the same: then each question has a surface of its own. A hash table, O(1) a
+/// question.
 template <Real S>
 class SurfaceNumbers {
  public:
@@ -26,20 +27,26 @@ class SurfaceNumbers {
   /// \param mixed() is asked for the material of a surface that is new
   template <class Mixed>
   std::uint32_t of(std::uint64_t name1, std::uint64_t name2, const Vector3<S>& drift, Mixed&& mixed) {
+    const auto enter = [&] {
+      names_.push_back({name1, name2});
+      surfaces_.push_back({mixed(), drift});
+      return static_cast<std::uint32_t>(names_.size() - 1);
+    };
+    if (!equalIsSame<S>) {  // nobody would find it again
+      return enter();
+    }
     if (2 * names_.size() >= places_.size()) {
       grow();
     }
     std::size_t place = placeOf({name1, name2});
     while (places_[place] != none) {
       const std::uint32_t k = places_[place];
-      if (equalIsSame<S> && names_[k] == Name{name1, name2} && surfaces_[k].drift == drift) {
+      if (names_[k] == Name{name1, name2} && surfaces_[k].drift == drift) {
         return k;
       }
       place = (place + 1) % places_.size();
     }
-    places_[place] = static_cast<std::uint32_t>(names_.size());
-    names_.push_back({name1, name2});
-    surfaces_.push_back({mixed(), drift});
+    places_[place] = enter();
     return places_[place];
   }
 

@@ -21,8 +21,9 @@ template <Real S>
 class SweptSpheres {
  public:
   /// No body gets further from where it starts than |v| h + |a| h^2/8, with the acceleration a of its course
-  /// and at most twice that of forces more, by what holds it; h^2/2 leaves room. Without walls v is less what
-  /// most bodies have in common: a pile in orbit has no more pairs to look at than one at rest. O(N).
+  /// and at most twice that of forces more, by what holds it; h^2/2 leaves room. A plane that goes on
+  /// speeding up by A into what leans on it holds it with 2 A besides. Without walls v is less what most
+  /// bodies have in common: a pile in orbit has no more pairs to look at than one at rest. O(N).
   ///
   /// \param scene `bodies`, their `course` with its mean velocity and acceleration, and `walls`
   /// \param h [s]
@@ -58,6 +59,9 @@ class SweptSpheres {
             h * h / S(2) *
                 (sumAbs(Vector3<S>(scene.course.acceleration(scene.bodies, i))) +
                  sumAbs(Vector3<S>(scene.bodies.accelerations()[i])));
+      if constexpr (requires { scene.support.carried(i); }) {
+        way += h * h / S(4) * scene.support.carried(i);
+      }
     }
     spheres_[i] = {scene.bodies.positions()[i], S(scene.bodies.radii()[i]) + way};
   }

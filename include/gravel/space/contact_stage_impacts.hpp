@@ -106,6 +106,8 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
     const Bodies& bodies;
     Scalar h;
     bool none;  // the solver may know of others than these
+    std::span<const Scalar> speedUps;
+    Scalar carried(std::uint32_t i) const { return speedUps.empty() ? Scalar(0) : speedUps[i]; }
     Vector3<Scalar> any(std::uint32_t i) const {
       return none ? Vector3<Scalar>(Vector3<Scalar>::Zero())
                   : Vector3<Scalar>(solver.changeOf(i) * (Scalar(2) / h));
@@ -122,7 +124,7 @@ void ContactStage<Scalar, Layout>::strike(Bodies& bodies, const Config& config, 
     }
     // Of any, along the axes in sum.
     Scalar most() const { return none ? Scalar(0) : Scalar(Scalar(4) * solver.mostFall()); }
-  } support{solver_, bodies, h, contacts_.empty()};
+  } support{solver_, bodies, h, contacts_.empty(), carried_};
   const detail::StepWays<Bodies, Course, Support, Scalar> ways{bodies, course, support, h};
   search(bodies, config, time, ways, h, profiler);
   searched_ = true;
