@@ -57,6 +57,21 @@ class Profiler {
     std::uint64_t untimed = 0;  ///< since the last one that was
     std::uint64_t step = 0;     ///< of that one
   };
+  using Clock = std::chrono::steady_clock;
+  /// Of the scopes that are open now. Those are of one object: a copy, which a hook may make, has none of
+  /// them, and would point into an object that may be gone before it.
+  struct Present {
+    Present() = default;
+    Present(const Present& /*other*/) noexcept {}
+    Present& operator=(const Present& /*other*/) noexcept { return *this; }
+    ~Present() = default;
+
+    Entry* running = nullptr;
+    Clock::time_point since{};
+    bool timed = true;
+    double weight = 1.0;  ///< steps that this one counts for
+    double passed = 0.0;  ///< [s] in all phases of this step
+  };
 
  public:
   /// Times the rest of the enclosing scope. Where scopes nest, the outer one's clock stands still meanwhile,
@@ -67,8 +82,8 @@ class Profiler {
         : profiler_(profiler),
           entry_(profiler.entries_[static_cast<std::size_t>(phase)]),
           sample_(profiler.samples_[static_cast<std::size_t>(phase)]),
-          outer_(profiler.running_),
-          timed_(outer_ == nullptr || !profiler.timed_ || sample_.untimed + 1 >= sample_.every ||
+          outer_(profiler.now_.running),
+          timed_(outer_ == nullptr || !profiler.now_.timed || sample_.untimed + 1 >= sample_.every ||
                  sample_.step != profiler.step_),
           before_(entry_.seconds) {
       if (timed_) {
@@ -84,12 +99,12 @@ class Profiler {
         return;
       }
       profiler_.change(outer_);
-      if (outer_ != nullptr && outer_ != &entry_ && profiler_.timed_) {
+      if (outer_ != nullptr && outer_ != &entry_ && profiler_.now_.timed) {
         const double own = entry_.seconds - before_;
         const double others = own * static_cast<double>(sample_.untimed);  // were booked on the outer one
         entry_.seconds += others;
         outer_->seconds -= others;
-        sample_ = {sampleOf(own / profiler_.weight_), 0, profiler_.step_};
+        sample_ = {sampleOf(own / profiler_.now_.weight), 0, profiler_.step_};
       }
     }
 
@@ -113,8 +128,8 @@ class Profiler {
     Step& operator=(const Step&) = delete;
     ~Step() {
       end();
-      profiler_.timed_ = true;
-      profiler_.weight_ = 1.0;
+      profiler_.now_.timed = true;
+      profiler_.now_.weight = 1.0;
     }
     /// Another step begins, outside of all phases.
     void next() {
@@ -125,13 +140,13 @@ class Profiler {
    private:
     void begin() {
       ++profiler_.step_;
-      profiler_.timed_ = profiler_.untimed_ + 1 >= profiler_.every_;
-      profiler_.weight_ = profiler_.timed_ ? static_cast<double>(profiler_.untimed_ + 1) : 0.0;
-      profiler_.passed_ = 0.0;
+      profiler_.now_.timed = profiler_.untimed_ + 1 >= profiler_.every_;
+      profiler_.now_.weight = profiler_.now_.timed ? static_cast<double>(profiler_.untimed_ + 1) : 0.0;
+      profiler_.now_.passed = 0.0;
     }
     void end() {
-      if (profiler_.timed_) {
-        profiler_.every_ = sampleOf(profiler_.passed_);
+      if (profiler_.now_.timed) {
+        profiler_.every_ = sampleOf(profiler_.now_.passed);
         profiler_.untimed_ = 0;
       } else {
         ++profiler_.untimed_;
@@ -184,8 +199,6 @@ class Profiler {
   }
 
  private:
-  using Clock = std::chrono::steady_clock;
-
   /// Of how many runs that take so long [s] one is timed.
   static constexpr std::uint64_t sampleOf(double seconds) {
     return seconds < 0.5e-6 ? 256 : seconds < 8e-6 ? 16 : 1;
@@ -193,26 +206,22 @@ class Profiler {
 
   /// Books the time since the last change on the running entry, and lets `next` run.
   void change(Entry* next) {
-    if (timed_) {
+    if (now_.timed) {
       const Clock::time_point now = Clock::now();
-      if (running_ != nullptr) {
-        const double passed = std::chrono::duration<double>(now - since_).count();
-        running_->seconds += passed * weight_;
-        passed_ += passed;
+      if (now_.running != nullptr) {
+        const double passed = std::chrono::duration<double>(now - now_.since).count();
+        now_.running->seconds += passed * now_.weight;
+        now_.passed += passed;
       }
-      since_ = now;
+      now_.since = now;
     }
-    running_ = next;
+    now_.running = next;
   }
 
   std::array<Entry, phaseCount> entries_{};
   std::array<Sample, phaseCount> samples_{};
   std::array<std::uint64_t, phaseCount> skipped_{};  // times in this step
-  Entry* running_ = nullptr;
-  Clock::time_point since_{};
-  bool timed_ = true;
-  double weight_ = 1.0;        // steps that this one counts for
-  double passed_ = 0.0;        // [s] in all phases of this step
+  Present now_;
   std::uint64_t every_ = 1;    // of so many steps one is timed
   std::uint64_t untimed_ = 0;  // steps since
   std::uint64_t step_ = 0;
