@@ -99,6 +99,16 @@ TEST_CASE("check: ranges work for a scalar that has no numeric_limits", "[check]
   CHECK_FALSE(detail::anyFinite<S>().contains(S(std::numeric_limits<double>::quiet_NaN())));
 }
 
+// Seen to fail: 0 allowed where 1e-300 is 0.
+TEMPLATE_TEST_CASE("check: what is positive is not zero, whatever the range of a user's scalar", "[check]",
+                   float, double, MinimalReal, MinimalRealOf<float>, Eigen::AutoDiffScalar<Eigen::Vector2d>) {
+  const auto positive = detail::positive<TestType>();
+  CHECK_FALSE(positive.contains(TestType(0)));
+  CHECK_FALSE(positive.contains(TestType(-1e-30)));
+  CHECK(positive.contains(TestType(1e-30)));
+  CHECK(positive.contains(TestType(1e30)));
+}
+
 TEMPLATE_TEST_CASE("types: isFinite of numbers, vectors, quaternions and expressions", "[types]", float,
                    double, long double) {
   using S = TestType;

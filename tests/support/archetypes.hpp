@@ -11,42 +11,45 @@
 namespace gravel::test {
 
 /// The least that is a `Real`: no implicit conversion, no stream, no numeric_limits, no other function than
-/// sqrt.
-class MinimalReal {
+/// sqrt. Its range is that of a `Stored`.
+template <class Stored>
+class MinimalRealOf {
  public:
-  MinimalReal() = default;
-  explicit MinimalReal(double value) : value_(value) {}
+  MinimalRealOf() = default;
+  explicit MinimalRealOf(double value) : value_(static_cast<Stored>(value)) {}
 
-  friend MinimalReal operator+(const MinimalReal& a, const MinimalReal& b) {
-    return MinimalReal(a.value_ + b.value_);
+  friend MinimalRealOf operator+(const MinimalRealOf& a, const MinimalRealOf& b) {
+    return MinimalRealOf(a.value_ + b.value_);
   }
-  friend MinimalReal operator-(const MinimalReal& a, const MinimalReal& b) {
-    return MinimalReal(a.value_ - b.value_);
+  friend MinimalRealOf operator-(const MinimalRealOf& a, const MinimalRealOf& b) {
+    return MinimalRealOf(a.value_ - b.value_);
   }
-  friend MinimalReal operator*(const MinimalReal& a, const MinimalReal& b) {
-    return MinimalReal(a.value_ * b.value_);
+  friend MinimalRealOf operator*(const MinimalRealOf& a, const MinimalRealOf& b) {
+    return MinimalRealOf(a.value_ * b.value_);
   }
-  friend MinimalReal operator/(const MinimalReal& a, const MinimalReal& b) {
-    return MinimalReal(a.value_ / b.value_);
+  friend MinimalRealOf operator/(const MinimalRealOf& a, const MinimalRealOf& b) {
+    return MinimalRealOf(a.value_ / b.value_);
   }
-  friend MinimalReal operator-(const MinimalReal& a) { return MinimalReal(-a.value_); }
-  MinimalReal& operator+=(const MinimalReal& b) { return *this = *this + b; }
-  MinimalReal& operator-=(const MinimalReal& b) { return *this = *this - b; }
-  MinimalReal& operator*=(const MinimalReal& b) { return *this = *this * b; }
-  MinimalReal& operator/=(const MinimalReal& b) { return *this = *this / b; }
-  friend bool operator<(const MinimalReal& a, const MinimalReal& b) { return a.value_ < b.value_; }
-  friend bool operator<=(const MinimalReal& a, const MinimalReal& b) { return a.value_ <= b.value_; }
-  friend bool operator>(const MinimalReal& a, const MinimalReal& b) { return a.value_ > b.value_; }
-  friend bool operator>=(const MinimalReal& a, const MinimalReal& b) { return a.value_ >= b.value_; }
-  friend bool operator==(const MinimalReal& a, const MinimalReal& b) { return a.value_ == b.value_; }
-  friend MinimalReal sqrt(const MinimalReal& a) { return MinimalReal(std::sqrt(a.value_)); }
+  friend MinimalRealOf operator-(const MinimalRealOf& a) { return MinimalRealOf(-a.value_); }
+  MinimalRealOf& operator+=(const MinimalRealOf& b) { return *this = *this + b; }
+  MinimalRealOf& operator-=(const MinimalRealOf& b) { return *this = *this - b; }
+  MinimalRealOf& operator*=(const MinimalRealOf& b) { return *this = *this * b; }
+  MinimalRealOf& operator/=(const MinimalRealOf& b) { return *this = *this / b; }
+  friend bool operator<(const MinimalRealOf& a, const MinimalRealOf& b) { return a.value_ < b.value_; }
+  friend bool operator<=(const MinimalRealOf& a, const MinimalRealOf& b) { return a.value_ <= b.value_; }
+  friend bool operator>(const MinimalRealOf& a, const MinimalRealOf& b) { return a.value_ > b.value_; }
+  friend bool operator>=(const MinimalRealOf& a, const MinimalRealOf& b) { return a.value_ >= b.value_; }
+  friend bool operator==(const MinimalRealOf& a, const MinimalRealOf& b) { return a.value_ == b.value_; }
+  friend MinimalRealOf sqrt(const MinimalRealOf& a) { return MinimalRealOf(std::sqrt(a.value_)); }
 
   /// For tests alone; the name is no hook of gravel.
-  double inTest() const { return value_; }
+  double inTest() const { return static_cast<double>(value_); }
 
  private:
-  double value_ = 0.0;
+  Stored value_ = Stored(0);
 };
+
+using MinimalReal = MinimalRealOf<double>;
 
 /// The least that is a `BodyStorage`: no reserve, no swap, default construction left out.
 template <class S>
@@ -240,12 +243,13 @@ class BoundStorage : public StorageOf<S, AoSoA<8>> {
 
 }  // namespace gravel::test
 
-template <>
-struct Eigen::NumTraits<gravel::test::MinimalReal> : Eigen::GenericNumTraits<gravel::test::MinimalReal> {
-  using Real = gravel::test::MinimalReal;
-  using NonInteger = gravel::test::MinimalReal;
-  using Literal = gravel::test::MinimalReal;
-  using Nested = gravel::test::MinimalReal;
+template <class Stored>
+struct Eigen::NumTraits<gravel::test::MinimalRealOf<Stored>>
+    : Eigen::GenericNumTraits<gravel::test::MinimalRealOf<Stored>> {
+  using Real = gravel::test::MinimalRealOf<Stored>;
+  using NonInteger = gravel::test::MinimalRealOf<Stored>;
+  using Literal = gravel::test::MinimalRealOf<Stored>;
+  using Nested = gravel::test::MinimalRealOf<Stored>;
   enum {
     IsComplex = 0,
     IsInteger = 0,

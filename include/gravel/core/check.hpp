@@ -71,10 +71,24 @@ inline Range<Scalar> nonNegative() {
   return {Scalar(0), anyFinite<Scalar>().high, "finite, >= 0"};
 }
 
+/// The smallest number that counts as positive: the smallest normal one, or of a user's own scalar the first
+/// of 1e-300, its root, the root of that, … that it holds.
+template <Real Scalar>
+inline Scalar leastPositive() {
+  if constexpr (std::is_floating_point_v<Scalar>) {
+    return std::numeric_limits<Scalar>::min();
+  } else {
+    double least = 1e-300;
+    while (!(Scalar(least) > Scalar(0))) {
+      least = std::sqrt(least);
+    }
+    return Scalar(least);
+  }
+}
+
 template <Real Scalar>
 inline Range<Scalar> positive() {
-  return {std::is_floating_point_v<Scalar> ? std::numeric_limits<Scalar>::min() : Scalar(1e-300),
-          anyFinite<Scalar>().high, "finite, > 0"};
+  return {leastPositive<Scalar>(), anyFinite<Scalar>().high, "finite, > 0"};
 }
 
 template <Real Scalar>
