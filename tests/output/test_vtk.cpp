@@ -3,6 +3,7 @@
 
 #include <unistd.h>
 
+#include <clocale>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
@@ -202,6 +203,37 @@ TEST_CASE("A series lists its frames with their times to the last bit", "[vtk]")
     CHECK(fs::exists(series.index().parent_path() / attribute(tag, "file")));
   }
   CHECK(text.find("<DataSet", at + 1) == std::string::npos);
+}
+
+// Seen to fail: 0,10000000000000001 by a program of German numbers, where there is that locale.
+TEST_CASE("The times of a series have a point whatever the program's decimal sign", "[vtk]") {
+  const Folder folder("comma");
+  const std::string before = std::setlocale(LC_NUMERIC, nullptr);
+  for (const char* name : {"de_DE.UTF-8", "de_DE.utf8", "de_DE", "fr_FR.UTF-8", "fr_FR.utf8"}) {
+    if (std::setlocale(LC_NUMERIC, name) != nullptr) {
+      break;
+    }
+  }
+  VtkSeries series(folder.path(), "pile");
+  series.write(VtkPoints(std::vector<Vector3<double>>(1, Vector3<double>::Zero())), 0.1);
+  std::setlocale(LC_NUMERIC, before.c_str());
+  CHECK_THAT(contents(series.index()), gravel::test::ContainsSubstring("timestep=\"0.1\""));
+}
+
+// Seen to fail: 1 frame after none was written, and two in the list after one.
+TEST_CASE("A series that cannot write a frame is as it was", "[vtk]") {
+  const Folder folder("as_it_was");
+  VtkSeries series(folder.path(), "pile");
+  const VtkPoints points(std::vector<Vector3<double>>(1, Vector3<double>::Zero()));
+  fs::create_directory(series.index());  // where the list should be
+  CHECK_THROWS_AS(series.write(points, 1.0), std::runtime_error);
+  CHECK(series.frames() == 0);
+  fs::remove(series.index());
+  series.write(points, 2.0);
+  CHECK(series.frames() == 1);
+  const std::string list = contents(series.index());
+  CHECK(list.find("timestep=\"1\"") == std::string::npos);
+  CHECK(list.find("timestep=\"2\" group=\"\" part=\"0\" file=\"pile_000000.vtp\"") != std::string::npos);
 }
 
 TEST_CASE("What cannot be written is an error with path and reason, and leaves nothing behind", "[vtk]") {

@@ -226,21 +226,21 @@ class VtkSeries {
     }
   }
 
-  /// \throws std::runtime_error with path and reason
+  /// \throws std::runtime_error with path and reason; then the series is as it was, and the next frame takes
+  /// the place of this one
   void write(const VtkPoints& points, double time) {
     char number[32];
     std::snprintf(number, sizeof number, "_%06zu.vtp", frames_);
     const std::string file = name_ + number;
     points.write(folder_ / file);
-    char timeText[40];
-    std::snprintf(timeText, sizeof timeText, "%.17g", time);
-    list_ += std::string("  <DataSet timestep=\"") + timeText + "\" group=\"\" part=\"0\" file=\"" +
-             detail::xmlEscaped(file) + "\"/>\n";
-    ++frames_;
+    std::string list = list_ + "  <DataSet timestep=\"" + detail::formatReal(time) +
+                       "\" group=\"\" part=\"0\" file=\"" + detail::xmlEscaped(file) + "\"/>\n";
     detail::writeFileWhole(index(),
                            "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n"
                            " <Collection>\n",
-                           list_, " </Collection>\n</VTKFile>\n");
+                           list, " </Collection>\n</VTKFile>\n");
+    list_.swap(list);
+    ++frames_;
   }
 
   std::size_t frames() const { return frames_; }
