@@ -138,13 +138,13 @@ std::string whyNotWritable(const fs::path& file) {
   if (fs::exists(file) && !fs::is_regular_file(file)) {
     return {};
   }
-  const fs::path partial = detail::targetOf(file).string() + ".part";
-  std::FILE* probe = std::fopen(partial.string().c_str(), "wb");
+  fs::path part;
+  std::FILE* probe = detail::openPart(detail::targetOf(file), part);
   if (probe == nullptr) {
-    return std::error_code(errno, std::generic_category()).message();
+    return detail::lastError().message();
   }
   std::fclose(probe);
-  fs::remove(partial);
+  fs::remove(part);
   return {};
 }
 

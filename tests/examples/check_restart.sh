@@ -149,9 +149,13 @@ refuses 2 "is the state at time 2; allowed: one before the end, 2" grains --rest
 refuses 1 "^gravel-run: the snapshot .*grains.toml" grains --restart "$folder/grains.toml"
 refuses 1 "cannot save to .*: it is a folder" grains --save "$folder/whole"
 
-mkdir "$folder/place.gravel.part"
-refuses 1 "cannot save to .*place.gravel: Is a directory" ball --save "$folder/place.gravel"
+# So long a name has no room for that of a part beside it; and a part takes no name that something has.
+long="$folder/$(printf %0253d 0)"
+refuses 1 "cannot save to $long: File name too long" ball --save "$long"
 [ ! -e "$folder/refused/summary.txt" ] || { echo "a run began that could not be saved"; exit 1; }
+echo mine >"$folder/mine.gravel.part"
+go ball mine || exit 1
+[ "$(cat "$folder/mine.gravel.part")" = mine ] || { echo "saving touched a file of another name"; exit 1; }
 refuses 1 "energies are not finite" not_finite --save "$folder/not_finite.gravel"
 [ ! -e "$folder/not_finite.gravel" ] || { echo "energies that are not finite were saved"; exit 1; }
 [ -e /dev/full ] || exit 0

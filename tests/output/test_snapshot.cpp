@@ -4,9 +4,11 @@
 #include <gravel/output/snapshot.hpp>
 
 #include <fcntl.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <cstring>
 #include <limits>
 #include <string>
@@ -228,12 +230,43 @@ TEST_CASE("A file is written through links to where they lead, and into what is 
 TEST_CASE("A failed write leaves the file before it as it was, and no part behind") {
   const TemporaryFile file("kept");
   file.put({'o', 'l', 'd'});
-  // The part file cannot be made where a folder of that name stands.
-  std::filesystem::create_directory(file.path() + ".part");
   SnapshotWriter out;
   out.value("x", 1.0);
-  CHECK_THROWS_AS(out.write(file.path()), std::runtime_error);
-  CHECK(std::filesystem::is_directory(file.path() + ".part"));
+  // A disk on which there is room for ten bytes.
+  rlimit before{};
+  REQUIRE(getrlimit(RLIMIT_FSIZE, &before) == 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit full{10, before.rlim_max};
+  REQUIRE(setrlimit(RLIMIT_FSIZE, &full) == 0);
+  std::string said;
+  try {
+    out.write(file.path());
+  } catch (const std::runtime_error& error) {
+    said = error.what();
+  }
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  CHECK_THAT(said, ContainsSubstring("cannot write " + file.path() + ": File too large"));
   CHECK(file.bytes() == std::vector<char>{'o', 'l', 'd'});
-  std::filesystem::remove(file.path() + ".part");
+  CHECK_FALSE(std::filesystem::exists(file.path() + ".part"));
+}
+
+// Seen to fail: the user's own file gone, and the permissions those of a new file.
+TEST_CASE("Writing a file touches nothing beside it, and leaves it its permissions") {
+  namespace fs = std::filesystem;
+  const TemporaryFile file("mine");
+  file.put({'o', 'l', 'd'});
+  const fs::perms mode = fs::perms::owner_read | fs::perms::owner_write | fs::perms::others_exec;
+  fs::permissions(file.path(), mode);
+  const std::string own = file.path() + ".part", folder = file.path() + ".part1";
+  std::ofstream(own) << "of the user";
+  fs::create_directory(folder);
+  detail::writeFileWhole(file.path(), "new");
+  CHECK(file.bytes() == std::vector<char>{'n', 'e', 'w'});
+  CHECK(fs::status(file.path()).permissions() == mode);
+  CHECK(fs::exists(own));
+  CHECK(fs::is_directory(folder));
+  CHECK_FALSE(fs::exists(file.path() + ".part2"));
+  fs::remove(own);
+  fs::remove(folder);
 }

@@ -258,10 +258,7 @@ TEST_CASE("What cannot be written is an error with path and reason, and leaves n
   }
   SECTION("a full disk") {
     if (fs::exists("/dev/full")) {
-      fs::create_symlink("/dev/full", folder.path() / "a.vtp.part");
-      CHECK_THROWS_WITH(points.write(folder.path() / "a.vtp"),
-                        gravel::test::ContainsSubstring("No space left on device"));
-      CHECK_FALSE(fs::exists(folder.path() / "a.vtp"));
+      CHECK_THROWS_WITH(points.write("/dev/full"), "gravel: cannot write /dev/full: No space left on device");
     }
   }
 }

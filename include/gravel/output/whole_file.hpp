@@ -20,23 +20,35 @@ namespace gravel::detail {
 
 using FileParts = std::array<std::string_view, 3>;
 
-/// The parts one after the other into a file of this name. \return the reason why it is not there, or none
-inline std::error_code writeParts(const std::filesystem::path& path, const FileParts& parts) {
-  const auto reason = [] { return std::error_code(errno, std::generic_category()); };
-  std::FILE* file = std::fopen(path.string().c_str(), "wb");
+inline std::error_code lastError() { return {errno, std::generic_category()}; }
+
+/// Writes the parts one after the other and closes the file. \param file  null where it could not be opened
+/// \return the reason why they are not there, or none
+inline std::error_code writeParts(std::FILE* file, const FileParts& parts) {
   if (file == nullptr) {
-    return reason();
+    return lastError();
   }
   std::error_code error;
   for (const std::string_view part : parts) {
     if (!error && !part.empty() && std::fwrite(part.data(), 1, part.size(), file) != part.size()) {
-      error = reason();
+      error = lastError();
     }
   }
   if (std::fclose(file) != 0 && !error) {
-    error = reason();
+    error = lastError();
   }
   return error;
+}
+
+/// Makes a file beside `target` that was not there before: <target>.part, or .part1, … where something has
+/// that name. \return null if that fails, with the reason in errno
+inline std::FILE* openPart(const std::filesystem::path& target, std::filesystem::path& part) {
+  std::FILE* file = nullptr;
+  for (int k = 0; k < 100 && file == nullptr && (k == 0 || errno == EEXIST); ++k) {
+    part = target.string() + ".part" + (k > 0 ? std::to_string(k) : "");
+    file = std::fopen(part.string().c_str(), "wbx");
+  }
+  return file;
 }
 
 /// Where links lead, whether it is there or not; a link where there is no end of them.
@@ -49,28 +61,33 @@ inline std::filesystem::path targetOf(std::filesystem::path path) {
 }
 
 /// Writes a whole file beside its place and moves it there, so that a reader never sees half of one, and what
-/// was there stays if it cannot be written. Through links to where they lead; what is no file, a device or a
-/// pipe, is written to as it is.
+/// was there stays if it cannot be written; its permissions stay in any case. Through links to where they
+/// lead; what is no file, a device or a pipe, is written to as it is. Nothing waits for the disk: who wants
+/// to be safe from a loss of power has to flush it himself.
 /// \throws std::runtime_error with path and reason; then nothing is left behind
 inline void writeFileWhole(const std::filesystem::path& path, std::string_view head,
                            std::string_view data = {}, std::string_view tail = {}) {
   namespace fs = std::filesystem;
   const FileParts parts{head, data, tail};
-  std::error_code error;
-  const fs::file_status place = fs::status(path, error);
+  std::error_code error, ignored;
+  const fs::file_status place = fs::status(path, ignored);
+  const fs::path target = targetOf(path);
   if (fs::exists(place) && !fs::is_regular_file(place) && !fs::is_directory(place)) {
-    error = writeParts(path, parts);
+    error = writeParts(std::fopen(path.string().c_str(), "wb"), parts);
+  } else if (fs::is_symlink(target, ignored)) {
+    error = make_error_code(std::errc::too_many_symbolic_link_levels);
   } else {
-    const fs::path target = targetOf(path);
-    const fs::path partial = target.string() + ".part";
-    std::error_code ignored;
-    error = fs::is_symlink(target, ignored) ? make_error_code(std::errc::too_many_symbolic_link_levels)
-                                            : writeParts(partial, parts);
-    if (!error) {
-      fs::rename(partial, target, error);
+    fs::path part;
+    std::FILE* const file = openPart(target, part);
+    if (file != nullptr && fs::is_regular_file(place)) {
+      fs::permissions(part, place.permissions(), ignored);
     }
-    if (error && !fs::is_directory(partial, ignored)) {
-      fs::remove(partial, ignored);
+    error = writeParts(file, parts);
+    if (!error) {
+      fs::rename(part, target, error);
+    }
+    if (error && file != nullptr) {
+      fs::remove(part, ignored);
     }
   }
   if (error) {
