@@ -331,7 +331,9 @@ class TableReader {
     if (!node.is_number()) {
       return wrongType(node, key, std::string("a number, ") + range.text);
     }
-    const double x = *node.value<double>();
+    // value<double>() is empty for whole numbers beyond 2^53.
+    const double x =
+        node.is_integer() ? static_cast<double>(node.as_integer()->get()) : node.as_floating_point()->get();
     if (!range.contains(x)) {
       return fault(node, key, detail::formatReal(x), range.allowed(x));
     }

@@ -1,7 +1,7 @@
 # cmake -DRUNNER=... -DFOLDER=... -P check_words.cmake
 #
 # The summary holds the name of a unit whole, however long it is, and does not speak of steps of changing length where
-# the integrator takes equal ones.
+# the integrator takes equal ones. Whole numbers are read whether or not a double holds all their digits.
 cmake_minimum_required(VERSION 3.25)
 file(REMOVE_RECURSE "${FOLDER}")
 include("${CMAKE_CURRENT_LIST_DIR}/scene_runs.cmake")
@@ -19,4 +19,13 @@ velocity = [0, 1, 0]
 ")
 if(NOT words MATCHES "in 4 steps of equal length.*axis [0-9.]+ ${mile}, eccentricity 0")
   message(FATAL_ERROR "a summary that is cut or wrong: ${words}")
+endif()
+# Seen to fail: 7e-310 kg, by a number that was not there.
+run_scene(whole_numbers "duration = 1
+simulation = {G = 0, timeStep = 1, adaptiveTimeStep = false}
+output.frames = 0
+body = [{mass = 10660000000000001, position = [9007199254740993, 0, 0]}]
+")
+if(NOT words MATCHES "^1 body of 1.066e.16 kg together")
+  message(FATAL_ERROR "a whole number was not read: ${words}")
 endif()
