@@ -6,9 +6,8 @@ namespace {
 
 /// Along its normal a plane wants the mean velocity of the step, across it that of the step's end.
 Vector3<double> velocityOf(const ScenePlane& plane, double time, double h) {
-  const double omega = 2.0 * pi<double>() / plane.shakePeriod;
-  const double mean = (std::sin(omega * (time + h)) - std::sin(omega * time)) / h;
-  const double end = omega * std::cos(omega * (time + h));
+  const double mean = (plane.swing(time + h) - plane.swing(time)) / h;
+  const double end = plane.omega() * std::cos(plane.omega() * (time + h));
   const Vector3<double> along = plane.normal.dot(plane.shake) * plane.normal;
   return plane.velocity + mean * along + end * (plane.shake - along);
 }

@@ -1,6 +1,7 @@
 #include "restart.hpp"
 #include "text.hpp"
 
+#include <limits>
 #include <set>
 #include <string>
 #include <type_traits>
@@ -33,6 +34,14 @@ bool areAlike(const Space<double>& a, const Space<double>& b, std::size_t i) {
          a.body(i).isFixed() == b.body(i).isFixed() && a.body(i).material() == b.body(i).material();
 }
 
+/// How far rounding may have brought a plane from where it should be. Each step adds a way, and of one that
+/// shakes a difference of two swings, whose phases are off by their last digits: those of a long time.
+double offByRounding(const ScenePlane& plane, double size, const Space<double>& saved) {
+  const double phase = plane.shakes() ? plane.omega() * saved.time() : 0.0;
+  return 1e-9 * size + std::numeric_limits<double>::epsilon() * static_cast<double>(saved.steps()) *
+                           (size + phase * plane.shake.norm());
+}
+
 /// The same surfaces, where the scene's way has brought them; one that shakes has another velocity in each
 /// step.
 bool areAlike(const Space<double>& a, const Plane<double>& ofA, const Space<double>& b,
@@ -40,11 +49,11 @@ bool areAlike(const Space<double>& a, const Plane<double>& ofA, const Space<doub
   const double time = b.time();
   Vector3<double> way = time * plane.velocity;
   if (plane.shakes()) {
-    way += std::sin(2.0 * pi<double>() * time / plane.shakePeriod) * plane.shake;
+    way += plane.swing(time) * plane.shake;
   }
   const double size = std::abs(ofA.offset) + time * plane.velocity.norm() + plane.shake.norm();
   return ofA.normal == ofB.normal && (plane.shakes() || ofA.velocity == ofB.velocity) &&
-         std::abs(ofA.offset + ofA.normal.dot(way) - ofB.offset) <= 1e-9 * size &&
+         std::abs(ofA.offset + ofA.normal.dot(way) - ofB.offset) <= offByRounding(plane, size, b) &&
          ofA.material == ofB.material && a.material(ofA.material) == b.material(ofB.material);
 }
 

@@ -6,6 +6,7 @@
 #include "render.hpp"
 #include <gravel/gravel.hpp>
 
+#include <cmath>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -32,6 +33,9 @@ struct ScenePlane {
   std::optional<Colour> colour;  ///< not drawn without one
 
   bool shakes() const { return shake != Vector3<double>::Zero(); }
+  /// Of the swing, of a plane that shakes: its angular frequency, and the share of `shake` at that time.
+  double omega() const { return 2.0 * pi<double>() / shakePeriod; }
+  double swing(double time) const { return std::sin(omega() * time); }
 };
 
 /// What comes of two bodies that meet.

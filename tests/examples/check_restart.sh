@@ -53,6 +53,13 @@ plane = [{shake = [0.01, 0, 0.02], shakePeriod = 0.75}]
 body = [{position = [0, 0, 0.1], radius = 0.1, mass = 1}, {position = [0, 0, 0.32], radius = 0.1, mass = 1},
         {position = [0, 0, 0.7], radius = 0.1, mass = 1}]
 end
+cat >"$2/swings.toml" <<'end'
+duration = 20
+simulation = {G = 0, timeStep = 0.01, adaptiveTimeStep = false}
+output.frames = 0
+plane = [{shake = [0, 0, 0.01], shakePeriod = 1.37e-6}]
+body = [{position = [0, 0, 10], radius = 0.1, mass = 1}]
+end
 cat >"$2/slow.toml" <<'end'
 duration = 2
 simulation = {G = 0, timeStep = 5}
@@ -66,6 +73,7 @@ output.frames = 0
 body = [{mass = 1e200, velocity = [1e60, 0, 0]}]
 end
 sed 's/shake = .*, shakeP/shake = [0.01, 0, 0.03], shakeP/' "$2/driven.toml" >"$2/other_shake.toml"
+sed 's/0.01]/0.0101]/' "$2/swings.toml" >"$2/other_swings.toml"
 sed 's/-1], turn/-2], turn/' "$2/driven.toml" >"$2/other_turn.toml"
 sed 's/mass = 1}]/mass = 2}]/' "$2/driven.toml" >"$2/other_mass.toml"
 sed 's/normal = .*/normal = [0.1, 0, 1]/' "$2/ball.toml" >"$2/other_normal.toml"
@@ -145,6 +153,10 @@ grep -q "^1 body of 3 merged" "$folder/driven_half/summary.txt" && grep -q "^2 b
 refuses 2 "of its plane 0 is not the scene's" other_shake --restart "$folder/driven_half.gravel"
 refuses 2 "its domain, field or planes are not the scene's" other_turn --restart "$folder/driven_half.gravel"
 refuses 2 "its mass is 3, the scene's 4" other_mass --restart "$folder/driven_half.gravel"
+# The phase of so many swings has lost its last digits. Seen to fail: refused.
+go swings swung --duration 15 || exit 1
+go swings swung_on --restart "$folder/swung.gravel" || exit 1
+refuses 2 "of its plane 0 is not the scene's" other_swings --restart "$folder/swung.gravel"
 refuses 2 "is the state at time 2; allowed: one before the end, 2" grains --restart "$folder/whole.gravel"
 refuses 1 "^gravel-run: the snapshot .*grains.toml" grains --restart "$folder/grains.toml"
 refuses 1 "cannot save to .*: it is a folder" grains --save "$folder/whole"
