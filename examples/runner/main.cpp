@@ -404,15 +404,17 @@ int main(int argc, char** argv) {
       "Without a scene file: a cloud of 2000 rocks that becomes a rubble pile.",
       "gravel-run"};
   Options options;
-  app.add_option("scene", options.sceneFile, "scene file (TOML), see examples/scenes")
-      ->check([](const std::string& text) {
-        return text.empty() ? std::string("is empty; allowed: the name of a file") : std::string();
-      });
-  app.add_option("-o,--output", options.output,
-                 "folder for what is written; default: out/<name of the scene>");
-  app.add_option("--save", options.save, "file for the state at the end, or where the run was stopped");
-  app.add_option("--restart", options.restart,
-                 "saved state of this scene that the run goes on from, to the end of its duration");
+  const auto addName = [&](const char* option, std::string& name, const char* of, const char* help) {
+    app.add_option(option, name, help)->check([of](const std::string& text) {
+      return text.empty() ? std::string("is empty; allowed: the name of a ") + of : std::string();
+    });
+  };
+  addName("scene", options.sceneFile, "file", "scene file (TOML), see examples/scenes");
+  addName("-o,--output", options.output, "folder",
+          "folder for what is written; default: out/<name of the scene>");
+  addName("--save", options.save, "file", "file for the state at the end, or where the run was stopped");
+  addName("--restart", options.restart, "file",
+          "saved state of this scene that the run goes on from, to the end of its duration");
   app.add_option("--duration", options.duration, "time to simulate, in place of the scene's own")
       ->check([](const std::string& text) {
         double time = 0.0;
