@@ -247,6 +247,9 @@ Overlaps overlapsAtStart(const Space<double>& space) {
   BroadPhase<double>().findPairs(space.bodies().positions(), space.bodies().radii(), space.bodies().ids(),
                                  0.0, space.domain(), space.time(), pairs);
   for (const Pair& pair : pairs) {
+    if (!detail::canTouch(space.bodies(), pair.first, pair.second)) {
+      continue;
+    }
     const auto a = space.body(pair.first), b = space.body(pair.second);
     const Vector3<double> r = space.domain().minimumImage(b.position() - a.position(), space.time());
     const double depth = (a.radius() + b.radius() - r.norm()) / smallerRadius(a.radius(), b.radius());

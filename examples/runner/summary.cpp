@@ -28,16 +28,18 @@ double contactsPerBody(const Space<double>& space) {
 
 std::size_t bodiesAtStart(const Scene& scene) { return scene.config.bodyCount + scene.bodies.size(); }
 
-/// Sentences on what the contacts built.
+/// Sentences on what the contacts built. At the end there are those that last: not the blows of the last
+/// step, which are over.
 void addContacts(std::string& text, const Scene& scene, const Space<double>& space, const History& history) {
   const std::size_t n = space.n();
   if (history.mostContacts == 0) {
     text += n < bodiesAtStart(scene) ? "" : "Nothing touched.\n";
     return;
   }
-  text += capital(counted(space.contactCount(), "contact", "contacts")) + " at the end" +
+  const std::size_t atEnd = space.contacts().size();
+  text += capital(counted(atEnd, "contact", "contacts")) + " at the end" +
           format(" (%.1f a body; most at once: %zu)", contactsPerBody(space), history.mostContacts);
-  if (space.contactCount() > 0) {
+  if (atEnd > 0) {
     text += format(", the deepest overlap is %.1e of a radius", deepestOverlap(space));
   }
   text += ".\n";
