@@ -77,7 +77,7 @@ double reachFrom(const Vector3<double>& target, const Space<double>& space, cons
 View viewOf(const Scene& scene, const Space<double>& space, const Trails& trails) {
   const PictureOptions& options = scene.picture;
   View view;
-  view.up = options.up.normalized();
+  view.up = options.up.stableNormalized();
   view.fieldOfView = options.fieldOfView;
   view.width = static_cast<int>(options.width);
   view.height = static_cast<int>(options.height);
@@ -93,7 +93,7 @@ View viewOf(const Scene& scene, const Space<double>& space, const Trails& trails
     const double slope = upright * std::min(1.0, static_cast<double>(view.width) / view.height);
     distance = reachFrom(view.target, space, trails) * std::max(1.15, std::hypot(1.0, slope)) / slope;
   }
-  view.eye = view.target + options.direction.normalized() * (distance > 0.0 ? distance : 1.0);
+  view.eye = view.target + options.direction.stableNormalized() * (distance > 0.0 ? distance : 1.0);
   return view;
 }
 

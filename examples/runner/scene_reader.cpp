@@ -381,7 +381,8 @@ void readPicture(TableReader& reader, PictureOptions& picture) {
   double span = 0.0;
   reader.vector("direction", picture.direction);
   reader.vector("up", picture.up);
-  if (!(picture.direction.cross(picture.up).stableNorm() > 1e-9 * picture.direction.stableNorm())) {
+  const Vector3<double> direction = picture.direction.stableNormalized(), up = picture.up.stableNormalized();
+  if (!(direction.cross(up).norm() > 1e-9)) {
     reader.faults().add(reader.where(), "\"direction\" in [picture] is " +
                                             detail::formatVector(picture.direction) +
                                             "; allowed: any direction but that of \"up\"");
