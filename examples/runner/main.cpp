@@ -22,6 +22,7 @@
 #include <new>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
 #ifdef _OPENMP
 #include <omp.h>
@@ -239,13 +240,13 @@ double nextStep(const Space<double>& space, const Scene& scene) {
 }
 
 /// Makes one step, or what is left of one until the end, so that each can be looked at. Which one an adaptive
-/// run begins with, the space finds when it makes it: until then it says the longest that is allowed. That is
-/// kept within the run for this one step; all later ones may be as long as the scene says, in a run that goes
-/// on from here, too.
-void stepTowards(Space<double>& space, const Scene& scene) {
+/// run begins with, or goes on with where bodies have merged, the space finds when it makes it: until then it
+/// says the longest that is allowed, or the one before. That is kept within the run for this one step; all
+/// later ones may be as long as the scene says, in a run that goes on from here, too.
+/// \param isNew  the bodies are not those of the last step
+void stepTowards(Space<double>& space, const Scene& scene, bool isNew) {
   const double rest = scene.duration - space.time();
-  const bool isChosenLater =
-      space.steps() == 0 && space.config().adaptiveTimeStep && space.config().minTimeStep < rest;
+  const bool isChosenLater = isNew && space.config().adaptiveTimeStep && space.config().minTimeStep < rest;
   const double longest = space.config().timeStep;
   const bool isLimited = isChosenLater && longest > rest;
   if (isLimited) {
@@ -345,8 +346,10 @@ int run(const Options& options) {
   drive(space, scene, nextStep(space, scene));
   observe(false);
   bool isStop = false;
+  // A merger may have been the last that an earlier run did.
+  std::size_t bodies = space.steps() == 0 || scene.meeting != Meeting::Bounce ? 0 : space.n();
   while (space.time() < scene.duration && !isStop) {
-    stepTowards(space, scene);
+    stepTowards(space, scene, std::exchange(bodies, space.n()) != space.n());
     diagnostics.count(space);
     isStop = stopRequested != 0 && space.time() < scene.duration;
     observe(isStop);

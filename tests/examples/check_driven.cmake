@@ -101,3 +101,15 @@ ends(bounced restitution 333333 "collisions.outcome = 'mergeBelowEscape'\n${two}
 if(words MATCHES "merged")
   message(FATAL_ERROR "without gravity what meets merges below the escape speed: ${words}")
 endif()
+# What has merged may be left alone, with the longest step. Seen to fail: ended at 10.2.
+run_scene(to_the_end "duration = 0.5
+simulation = {G = 1, timeStep = 10}
+output.frames = 0
+collisions.outcome = 'merge'
+body = [{position = [0, -0.1, 0], radius = 0.1, mass = 1}, {position = [0.4, 0.2, 0], radius = 0.1, mass = 1},
+        {position = [0.5, -0.3, 0], radius = 0.1, mass = 1}]
+")
+last_value(time to_the_end time)
+if(NOT time STREQUAL "0.5" OR NOT words MATCHES "2 bodies of 3 merged")
+  message(FATAL_ERROR "a run of 0.5 whose bodies merge ended at ${time}: ${words}")
+endif()
