@@ -24,7 +24,11 @@ class Sequence {
   double uniform(double low, double high) { return low + (high - low) * uniform(); }
   double normal() { return random_.normal(counter_++); }
   Vector3<double> direction() { return random_.direction(counter_++); }
-  Vector3<double> inBall(double radius) { return direction() * (radius * std::cbrt(uniform())); }
+  Vector3<double> inBall(double radius) {
+    const double distance =
+        radius * std::cbrt(uniform());  // drawn first: in one expression there is no order
+    return direction() * distance;
+  }
   Vector3<double> normalVector() {
     const double x = normal(), y = normal(), z = normal();
     return {x, y, z};
@@ -43,8 +47,13 @@ inline double powerLawRadius(Sequence& random, double low, double high, double e
   if (exponent == 0.0) {
     return random.uniform(low, high);
   }
-  const double a = std::pow(low, -exponent), b = std::pow(high, -exponent);
-  return std::clamp(std::pow(a + (b - a) * random.uniform(), -1.0 / exponent), low, high);
+  const double a = std::pow(low, -exponent), b = std::pow(high, -exponent), share = random.uniform();
+  const double radius =
+      std::isnormal(a) && std::isnormal(b)
+          ? std::pow(a + (b - a) * share, -1.0 / exponent)
+          : low * std::exp(-std::log1p(std::expm1(exponent * (std::log(low) - std::log(high))) * share) /
+                           exponent);  // the same, where powers leave the range
+  return std::clamp(radius, low, high);
 }
 
 /// Spheres placed one after the other, none overlapping another (random sequential addition). `period` > 0
@@ -54,7 +63,7 @@ class Placement {
   explicit Placement(double largestRadius, double period = 0.0)
       : cell_(std::max(2.0 * largestRadius, 1e-300)), period_(period) {
     if (period > 0.0) {
-      side_ = static_cast<std::int64_t>(period / cell_);
+      side_ = cellNumber(period);
       if (side_ < 3) {
         throw std::invalid_argument("scene: the box holds fewer than three of its largest spheres a side");
       }
@@ -106,10 +115,17 @@ class Placement {
     double radius;
   };
 
+  /// \throws std::invalid_argument where places have too few digits to tell spheres apart
+  std::int64_t cellNumber(double x) const {
+    const double number = std::floor(x / cell_);
+    if (!(std::abs(number) <= 1e15)) {
+      throw std::invalid_argument("scene: the region is more than 1e15 of its largest spheres wide");
+    }
+    return static_cast<std::int64_t>(number);
+  }
+
   std::array<std::int64_t, 3> cellOf(const Vector3<double>& x) const {
-    return {static_cast<std::int64_t>(std::floor(x[0] / cell_)),
-            static_cast<std::int64_t>(std::floor(x[1] / cell_)),
-            static_cast<std::int64_t>(std::floor(x[2] / cell_))};
+    return {cellNumber(x[0]), cellNumber(x[1]), cellNumber(x[2])};
   }
 
   std::uint64_t keyOf(std::array<std::int64_t, 3> c) const {
@@ -283,6 +299,9 @@ std::vector<Body<S>> grainColumn(const ColumnOptions& options) {
   const double inner = options.radius - room;
   if (!(inner >= 0.0)) {
     throw std::invalid_argument("scene: the column is narrower than its largest grain");
+  }
+  if (!(inner / pitch <= 32768.0)) {  // one layer takes 3e9
+    throw std::invalid_argument("scene: the column is more than 65536 of its largest grains wide");
   }
   Sequence random(options.seed);
   const auto steps = static_cast<int>(inner / pitch);
