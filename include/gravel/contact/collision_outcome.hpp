@@ -9,6 +9,8 @@
 #include <gravel/core/callback.hpp>
 #include <gravel/core/check.hpp>
 
+#include <utility>
+
 namespace gravel {
 
 /// Two bodies at the moment at which they hit each other.
@@ -122,6 +124,46 @@ Scalar cubeRoot(const Scalar& x) {
   return y;
 }
 
+/// As merged(), of bodies with the factors k = I/(m r^2): those are in range where I is not.
+/// \return the one without an inertia, and its factor
+template <Real Scalar>
+std::pair<Body<Scalar>, Scalar> mergedByFactors(const Body<Scalar>& a, const Scalar& k_a,
+                                                const Body<Scalar>& b, const Scalar& k_b,
+                                                const Vector3<Scalar>& r_ab, const Vector3<Scalar>& v_ab,
+                                                const Vector3<Scalar>& turn) {
+  const MassShares<Scalar> share = massShares<Scalar>(a.mass, true, b.mass, true);  // by inverse mass
+  // Relative to the larger radius, that cubes stay in range.
+  const Scalar larger = std::max<Scalar>(a.radius, b.radius);
+  const Scalar ratio = larger > Scalar(0) ? Scalar(std::min<Scalar>(a.radius, b.radius) / larger) : Scalar(0);
+  Body<Scalar> one = a;
+  one.mass = a.mass + b.mass;
+  one.radius = larger * cubeRoot<Scalar>(Scalar(1) + ratio * ratio * ratio);
+  one.inertia.reset();
+  const Scalar k = k_a == k_b ? k_a : Scalar(share.second * k_a + share.first * k_b);
+  if (a.fixed) {
+    return {one, k};
+  }
+  // a's share of the motion of b: m_b / (m_a + m_b) is a's share by inverse mass.
+  one.position = a.position + share.first * r_ab;
+  one.velocity = a.velocity + share.first * v_ab;
+  if (!(one.radius > Scalar(0))) {
+    return {one, k};
+  }
+  // Angular momentum over m r^2 of the one, which itself leaves the range of a float.
+  const auto spinOf = [&](const Body<Scalar>& body, const Scalar& factor, const Scalar& shareOfMass) {
+    const Scalar x = body.radius / one.radius;
+    return Vector3<Scalar>((shareOfMass * factor * x * x) * Vector3<Scalar>(body.angularVelocity + turn));
+  };
+  const Vector3<Scalar> arm = r_ab / one.radius;
+  const Vector3<Scalar> orbit =
+      share.first * share.second * arm.cross(Vector3<Scalar>(v_ab / one.radius + turn.cross(arm)));
+  const Vector3<Scalar> angular = spinOf(a, k_a, share.second) + spinOf(b, k_b, share.first) + orbit;
+  if (k > Scalar(0)) {
+    one.angularVelocity = angular / k - turn;
+  }
+  return {one, k};
+}
+
 }  // namespace detail
 
 /// One body in place of two: mass, momentum, angular momentum (spin takes up that of the orbit), centre of
@@ -136,41 +178,10 @@ template <Real Scalar>
 Body<Scalar> merged(const Body<Scalar>& a, const Body<Scalar>& b, const Vector3<Scalar>& r_ab,
                     const Vector3<Scalar>& v_ab,
                     const Vector3<Scalar>& turn = Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(0))) {
-  const MassShares<Scalar> share = massShares<Scalar>(a.mass, true, b.mass, true);  // by inverse mass
-  // Relative to the larger radius, that cubes stay in range.
-  const Scalar larger = std::max<Scalar>(a.radius, b.radius);
-  const Scalar ratio = larger > Scalar(0) ? Scalar(std::min<Scalar>(a.radius, b.radius) / larger) : Scalar(0);
-  Body<Scalar> one = a;
-  one.mass = a.mass + b.mass;
-  one.radius = larger * detail::cubeRoot<Scalar>(Scalar(1) + ratio * ratio * ratio);
-  one.inertia.reset();
-  const bool homogeneous = !a.inertia && !b.inertia;
-  const Scalar factor = share.second * detail::inertiaFactor(a) + share.first * detail::inertiaFactor(b);
-  if (!homogeneous && one.mass > Scalar(0) && one.radius > Scalar(0)) {
-    one.inertia = factor * one.mass * one.radius * one.radius;
-  }
-  if (a.fixed) {
-    return one;
-  }
-  // a's share of the motion of b: m_b / (m_a + m_b) is a's share by inverse mass.
-  one.position = a.position + share.first * r_ab;
-  one.velocity = a.velocity + share.first * v_ab;
-  if (!(one.radius > Scalar(0))) {
-    return one;
-  }
-  // Angular momentum over m r^2 of the one, which itself leaves the range of a float.
-  const auto spinOf = [&](const Body<Scalar>& body, const Scalar& shareOfMass) {
-    const Scalar x = body.radius / one.radius;
-    return Vector3<Scalar>((shareOfMass * detail::inertiaFactor(body) * x * x) *
-                           Vector3<Scalar>(body.angularVelocity + turn));
-  };
-  const Vector3<Scalar> arm = r_ab / one.radius;
-  const Vector3<Scalar> orbit =
-      share.first * share.second * arm.cross(Vector3<Scalar>(v_ab / one.radius + turn.cross(arm)));
-  const Vector3<Scalar> angular = spinOf(a, share.second) + spinOf(b, share.first) + orbit;
-  const Scalar k = homogeneous ? detail::homogeneousFactor<Scalar>() : factor;
-  if (k > Scalar(0)) {
-    one.angularVelocity = angular / k - turn;
+  auto [one, k] = detail::mergedByFactors<Scalar>(a, detail::inertiaFactor(a), b, detail::inertiaFactor(b),
+                                                  r_ab, v_ab, turn);
+  if ((a.inertia || b.inertia) && one.mass > Scalar(0) && one.radius > Scalar(0)) {
+    one.inertia = k * one.mass * one.radius * one.radius;
   }
   return one;
 }

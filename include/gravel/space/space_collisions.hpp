@@ -107,6 +107,10 @@ void Space<Scalar, Layout>::merge(BodyId stays, BodyId goes, const Scalar& time)
   const std::size_t j = bodies_.indexOf(goes);
   const Body<Scalar> a = bodies_[i].load();
   const Body<Scalar> b = bodies_[j].load();
+  const auto factorOf = [](const BodyProxy& body) {
+    const bool has = body.mass() > Scalar(0) && body.radius() > Scalar(0);
+    return has ? Scalar(body.inertiaFactor()) : detail::homogeneousFactor<Scalar>();
+  };
   const Vector apart = b.position - a.position;
   Vector r_ab = apart;
   Vector drift = Vector::Zero();
@@ -121,8 +125,11 @@ void Space<Scalar, Layout>::merge(BodyId stays, BodyId goes, const Scalar& time)
   const Scalar motion = bodies_[i].kineticEnergy() + bodies_[j].kineticEnergy() + sped;
   const Scalar energy = bindingEnergy(i, time) + bindingEnergy(j, time) - pairEnergy(i, j, time);
   const Vector pull = Vector(bodies_[i].force()) + Vector(bodies_[j].force());
-  const Body<Scalar> one = merged(a, b, r_ab, v_ab, Vector(Scalar(0), Scalar(0), frame.omega));
+  const auto [one, k] =
+      detail::mergedByFactors<Scalar>(a, factorOf(bodies_[i]), b, factorOf(bodies_[j]), r_ab, v_ab,
+                                      Vector(Scalar(0), Scalar(0), frame.omega));
   bodies_[i].store(one);
+  bodies_[i].inertiaFactor() = k;  // by itself: the inertia of a giant planet is no float
   if (!one.fixed) {
     bodies_[i].force() = pull;
     bodies_[i].acceleration() = pull / one.mass;
