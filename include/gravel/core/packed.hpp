@@ -129,7 +129,11 @@ struct Packed {
     if constexpr (isPackable<S>) {
       Eigen::Array<S, 4, 1> root;  // std::sqrt stays scalar unless errno is switched off
       std::memcpy(root.data(), &a.v, sizeof(Raw));
-      root = root.sqrt().eval();
+      if constexpr (std::is_same_v<S, float>) {  // Eigen's own is an estimate, another on each processor
+        root = root.template cast<double>().sqrt().template cast<float>().eval();  // rounds but once
+      } else {
+        root = root.sqrt().eval();
+      }
       Packed out;
       std::memcpy(&out.v, root.data(), sizeof(Raw));
       return out;
