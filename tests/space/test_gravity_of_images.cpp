@@ -214,3 +214,30 @@ TEST_CASE("A domain too long for gravity is refused at once, and so is gravity i
   CHECK_THROWS_WITH(space.setG(1), ContainsSubstring("longest edge of a domain with gravity"));
   CHECK(space.getG() == 0.0);
 }
+
+// Seen to fail: the energy of one body (refused as a domain with gravity).
+TEST_CASE("Without gravity a domain may be of any length, whatever is done and asked there") {
+  for (const bool sheared : {false, true}) {
+    CAPTURE(sheared);
+    SimulationConfig<double> config = plain(1e-3);
+    config.integrator = sheared ? IntegratorKind::SymplecticEpicycle : IntegratorKind::VelocityVerlet;
+    Space<double> space(config);
+    const auto domain =
+        sheared ? Domain<double>::shearPeriodic({1, 1e5, 1}, 0.1) : Domain<double>::periodic({1, 1, 1e4});
+    space.setDomain(domain);
+    space.setCollisionHook([](const Collision<double>&) { return CollisionOutcome<double>::merge(); });
+    const BodyId first = space.addBody(ball({0, 0, 0}, {1, 0, 0}, 0.1, 2.0));
+    CHECK(std::get<2>(space.calculateSystemEnergy()) == 0.0);
+    advance(space, 1);
+    const double before = space.energyLedger().total();
+    space.setDomain(domain);
+    space.addBody(ball({0.205, 0, 0}, {-1, 0, 0}, 0.1, 1.0));
+    const BodyId last = space.addBody(ball({0, 0.4, 0.4}, {0, 0, 1}, 0.0, 1.0));
+    advance(space, 20);
+    CHECK(space.n() == 2);
+    CHECK_THAT(space.energyLedger().restitution, WithinRel(4.0 / 3, 0.01));
+    space.removeBody(last);
+    space.removeBody(first);
+    CHECK_THAT(space.energyLedger().total(), WithinAbs(before, 1e-4));
+  }
+}

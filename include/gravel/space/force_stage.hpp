@@ -118,7 +118,7 @@ class ForceStage {
   Scalar potentialEnergy(const Bodies<Scalar, Layout>& bodies, const Scalar& G, const Scalar& softening,
                          const Domain<Scalar>& domain, const Scalar& time) {
     Scalar energy(0);
-    const bool ownImages = bodies.size() == 1 && !domain.isOpen();
+    const bool ownImages = bodies.size() == 1 && !domain.isOpen() && !(G == Scalar(0));
     if (reasonToSkip(bodies, G) == nullptr || ownImages) {
       gravity.setDomain(domain, time);
       energy += gravity.potentialEnergy(bodies.positions(), bodies.masses(), G, softening);
