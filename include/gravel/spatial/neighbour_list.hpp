@@ -45,13 +45,14 @@ class NeighbourList {
     if (rebuilt_) {
       rebuild(positions, radii, ids, revision, domain, time, margin, travel);
     }
+    slack_ = S(alongside(margin, common_.shearing()) + free_ * (common_.spread() - S(1)));
     comparisons_ += swift_.size();
     swiftPairs_.resize(std::max(swiftPairs_.size(), swift_.size()));
     const auto rest = common_.lessThis(positions, travel);
     parallelForTasks(swift_.size(), [&](std::size_t k) {
       swiftPairs_[k].clear();
       detail::compare(swift_[k], positions, radii, ids, detail::wayOf<S>(rest, swift_[k]), rest,
-                      common_.ahead(), S(room_ - skin_), free_, bend_, domain_, now_, S(0), swiftPairs_[k]);
+                      common_.ahead(), slack_, free_, bend_, domain_, now_, S(0), swiftPairs_[k]);
     });
     for (std::size_t k = 0; k < swift_.size(); ++k) {
       extra_.insert(extra_.end(), swiftPairs_[k].begin(), swiftPairs_[k].end());
@@ -72,8 +73,8 @@ class NeighbourList {
       ++comparisons_;
       strays_ = true;
       detail::compare(i, positions, radii, ids, common_.lessThis(Vector3<S>(positions[i]), way),
-                      common_.lessThis(positions, travel), common_.ahead(), S(room_ - skin_), free_, bend_,
-                      domain_, now_, share, out);
+                      common_.lessThis(positions, travel), common_.ahead(), slack_, free_, bend_, domain_,
+                      now_, share, out);
     }
   }
 
@@ -106,8 +107,7 @@ class NeighbourList {
                                : "no body has moved half the skin since the last search";
   }
   const S& skin() const { return skin_; }  ///< [m] of the list in use
-  /// Fixes the skin [m] >= 0 from the next search on, or has it chosen from the motion seen. Costs only: a
-  /// thick skin means fewer searches and more candidates.
+  /// [m] >= 0 from the next search on, or chosen by the motion. A thick one: few searches, many candidates.
   void setSkin(std::optional<S> skin) {
     if (skin) {
       detail::require("skin", *skin, detail::nonNegative<S>());
@@ -135,7 +135,7 @@ class NeighbourList {
     }
     flow_ = S(1.5) * domain.omega() * (time - time_);
     const S drift = (flow_ < S(0) ? S(-flow_) : flow_) + common_.shearing();
-    free_ = (room_ - margin - drift * (S(2) * largest_ + margin)) / common_.spread();
+    free_ = (room_ - alongside(margin, drift)) / common_.spread();
     if (free_ < S(0)) {
       return margin > S(0) ? "the margin grew or the flow used up the skin" : "the flow used up the skin";
     }
@@ -211,6 +211,9 @@ class NeighbourList {
     return detail::squareOfSum<S>(farthest_sq, detail::bendLess_sq<S>(travel, i, common_.bend()));
   }
 
+  /// [m] What a margin takes besides the skin where the flow shears by that much.
+  S alongside(const S& margin, const S& shear) const { return margin + shear * (S(2) * largest_ + margin); }
+
   /// How far a body may get, less what subtraction loses: a few units in its last place.
   void setHalf() {
     const S half = free_ / S(2) - S(16) * detail::roundoff<S>() * common_.most();
@@ -262,7 +265,7 @@ class NeighbourList {
     free_ = skin_;
     setHalf();
     comparisons_ = 0;
-    room_ = margin + skin_ * common_.spread() + common_.shearing() * (S(2) * largest_ + margin);
+    room_ = alongside(margin, common_.shearing()) + skin_ * common_.spread();
     // Distances at both times and the displacement are rounded: a few units of what is subtracted.
     const S scale =
         S(2) * largest_ + room_ + common_.most() + (domain.isOpen() ? S(0) : S(domain.lengths().maxCoeff()));
@@ -295,10 +298,11 @@ class NeighbourList {
   S now_ = S(0);  ///< of the last update
   S largest_ = S(0);
   S skin_ = S(0);
-  S room_ = S(0);  ///< margin and skin of the last search
-  S free_ = S(0);  ///< what is left of the skin
-  S half_ = S(0);  ///< how far a body may get
-  S bend_ = S(0);  ///< of any way, at most
+  S room_ = S(0);   ///< margin and skin of the last search
+  S free_ = S(0);   ///< what is left of the skin
+  S slack_ = S(0);  ///< what else the margin of the last update wants
+  S half_ = S(0);   ///< how far a body may get
+  S bend_ = S(0);   ///< of any way, at most
   detail::CommonMotion<S> common_;
   S flow_ = S(0);  ///< [1] shear since the last search
   S moved_sq_ = S(0);
