@@ -74,9 +74,9 @@ class Settings {
   explicit Settings(const SimulationConfig<Scalar>& config) : config_(config) { config_.validate(); }
   ~Settings() = default;
   Settings(const Settings&) = default;
-  Settings(Settings&&) noexcept = default;
+  Settings(Settings&&) = default;  // NOLINT(performance-noexcept-move-constructor)
   Settings& operator=(const Settings&) = default;
-  Settings& operator=(Settings&&) noexcept = default;
+  Settings& operator=(Settings&&) = default;  // NOLINT(performance-noexcept-move-constructor)
 
   /// Sets one field if the whole configuration stays valid with it.
   template <class T>
@@ -88,8 +88,8 @@ class Settings {
     config_ = next;
   }
 
+  detail::StepInProgress inStep_;  // the first member: see there
   SimulationConfig<Scalar> config_;
-  detail::StepInProgress inStep_;
 };
 
 }  // namespace gravel

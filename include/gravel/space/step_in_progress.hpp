@@ -9,12 +9,24 @@
 
 namespace gravel::detail {
 
-/// Whether a step of an object is on; a copy, which a hook may make, is not in it.
+/// Whether a step of an object is on. As its first member it refuses to have the object moved from, or
+/// assigned to, inside a step, while nothing has changed. A copy, which a hook may make, is not in the step.
 class StepInProgress {
  public:
   StepInProgress() = default;
   StepInProgress(const StepInProgress& /*other*/) noexcept {}
-  StepInProgress& operator=(const StepInProgress& /*other*/) noexcept { return *this; }
+  // NOLINTNEXTLINE(performance-noexcept-move-constructor)
+  StepInProgress(StepInProgress&& other) { other.refuse("a move from the space"); }
+  StepInProgress& operator=(const StepInProgress& /*other*/) {
+    refuse("assignment to the space");
+    return *this;
+  }
+  // NOLINTNEXTLINE(performance-noexcept-move-constructor)
+  StepInProgress& operator=(StepInProgress&& other) {
+    refuse("assignment to the space");
+    other.refuse("a move from the space");
+    return *this;
+  }
   ~StepInProgress() = default;
 
   /// Until the end of a scope, however that is left.
