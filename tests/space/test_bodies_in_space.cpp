@@ -583,6 +583,27 @@ TEST_CASE("What the next step would refuse can be asked for without a step") {
   CHECK_THROWS_WITH(planets.check(), ContainsSubstring("largest mass with the integrator WisdomHolman is 0"));
 }
 
+// Seen to fail: check() had nothing to say, and reports were those of a step of 0.002.
+TEST_CASE("A planet without an orbit is refused before anything is changed, and can be asked for") {
+  SimulationConfig<double> config = quiet();
+  config.integrator = IntegratorKind::WisdomHolman;
+  Space<double> planets(config);
+  planets.addBody(at({0, 0, 0}, 0.0));
+  planets.addBody(at({1, 0, 0}, 0.0));
+  planets.computeDynamics(0);
+  const double last = planets.getPreviousTimeStep();
+  const std::uint64_t evaluations = planets.profiler().entry(Phase::Gravity).calls;
+  planets.setTimeStep(2 * last);
+  CHECK_NOTHROW(planets.check());
+  planets.body(1).position() = Vector3<double>(planets.body(0).position());
+  CHECK_THROWS_WITH(planets.check(), ContainsSubstring("of body 1 from the centre of mass"));
+  CHECK_THROWS_WITH(planets.computeDynamics(1), ContainsSubstring("of body 1 from the centre of mass"));
+  CHECK(planets.getPreviousTimeStep() == last);
+  CHECK(planets.profiler().entry(Phase::Gravity).calls == evaluations);
+  planets.body(1).position()[0] += 1.0;
+  CHECK_NOTHROW(planets.computeDynamics(1));
+}
+
 // Seen to fail: taken, and refused by the first step as the margin of a search, of no body.
 TEST_CASE("A radius whose square is no number is refused with its body") {
   Space<double> space(quiet());

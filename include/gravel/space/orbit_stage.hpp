@@ -24,9 +24,9 @@ class OrbitStage {
   static bool moves(IntegratorKind kind) { return traitsOf(kind).stages.empty(); }
 
   /// \throws std::invalid_argument if bodies may touch something, or the domain has images, or a force's rate
-  ///   of change is needed and not known, or there is no centre that moves
-  static void check(IntegratorKind kind, const Bodies& bodies, const ContactStage<Scalar, Layout>& contact,
-                    const ForceStage<Scalar, Layout>& force) {
+  ///   of change is needed and not known, or there is no centre that moves, or a body has no orbit
+  void check(IntegratorKind kind, const Bodies& bodies, const ContactStage<Scalar, Layout>& contact,
+             const ForceStage<Scalar, Layout>& force) const {
     if (!moves(kind)) {
       return;
     }
@@ -42,7 +42,7 @@ class OrbitStage {
                      "none: the method needs how forces change with time, which is known of gravity alone");
     }
     if (kind == IntegratorKind::WisdomHolman && !bodies.empty()) {
-      WisdomHolman<Scalar>::check(bodies);
+      wisdomHolman_.prepare(bodies);
     }
     for (std::size_t i = 0; bodies.size() > 1 && i < bodies.size(); ++i) {
       if (Scalar(bodies.radii()[i]) > Scalar(0)) {
@@ -52,14 +52,11 @@ class OrbitStage {
     }
   }
 
-  /// Advances all bodies by h [s]. \param forces  as in integrate()
+  /// Advances all bodies by h [s], after check(). \param forces  as in integrate()
   template <class Forces>
   void advance(const SimulationConfig<Scalar>& config, Bodies& bodies, const Scalar& h,
                const ForceStage<Scalar, Layout>& force, Forces&& forces) {
     const Scalar half = h / Scalar(2);
-    if (config.integrator == IntegratorKind::WisdomHolman) {
-      wisdomHolman_.prepare(bodies);
-    }
     spin(bodies, half, h, force.hasTorques());
     if (config.integrator == IntegratorKind::WisdomHolman) {
       wisdomHolman_.advance(bodies, config.G, h, forces);
@@ -129,7 +126,7 @@ class OrbitStage {
   }
 
   GaussRadau15<Scalar> gaussRadau_;
-  WisdomHolman<Scalar> wisdomHolman_;
+  mutable WisdomHolman<Scalar> wisdomHolman_;  // to check is to prepare
   Hermite4<Scalar> hermite_;
   JerkSum<Scalar> jerks_;
 };

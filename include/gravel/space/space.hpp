@@ -148,7 +148,7 @@ class Space : public Settings<Scalar> {
   /// has moved then
   void computeDynamics(std::size_t iteration);
   /// Looks at all that the next step looks at before anything moves. \throws std::invalid_argument as above
-  void check() const;
+  void check() const { check(dt_); }
   /// Steps until `time` [s] exactly; the last two are shortened alike. \throws std::invalid_argument for a
   /// time before now or not finite
   void advanceTo(Scalar time);
@@ -239,7 +239,6 @@ class Space : public Settings<Scalar> {
 
  private:
   friend class ::SpaceTest;
-
   struct Departure;
 
   std::size_t checkedIndex(std::size_t i) const;
@@ -262,7 +261,8 @@ class Space : public Settings<Scalar> {
   bool hasSeveralDrifts() const;
   std::size_t chooseParts(const Scalar& h);
   void advance(const Scalar& h, std::size_t part, std::size_t parts, Scalar& found);
-  void prepare();
+  void check(const Scalar& h) const;
+  void prepare(const Scalar& h);
   void wakeTheChanged();
   void fallAsleep();
   typename ContactStage<Scalar, Layout>::Touches allTouches() const;

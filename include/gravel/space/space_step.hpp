@@ -29,7 +29,7 @@ template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::computeDynamics(std::size_t iteration) {
   this->inStep_.refuse("computeDynamics()");
   const detail::StepInProgress::Scope inside(this->inStep_);
-  prepare();
+  prepare(dt_);
   step(dt_, iteration);
 }
 
@@ -42,8 +42,8 @@ void Space<Scalar, Layout>::advanceTo(Scalar time) {
   }
   const detail::StepInProgress::Scope inside(this->inStep_);
   while (time_ < time) {
-    prepare();
     const Scalar rest = time - time_;
+    prepare(stepTowards(rest, dt_));
     const Scalar next = dt_;
     const Scalar h = stepTowards(rest, next);
     const bool alike = h == next && !this->config_.adaptiveTimeStep && !this->config_.diagnosticsEnabled;
@@ -122,18 +122,23 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration, const Sc
 }
 
 template <Real Scalar, class Layout>
-void Space<Scalar, Layout>::check() const {
+void Space<Scalar, Layout>::check(const Scalar& h) const {
   bodies_.validateAll();
   contact_.materials.check(bodies_);
   contact_.checkSizes(bodies_);
   orbits_.check(this->config_.integrator, bodies_, contact_, force_);
+  const HillFrame<Scalar> frame(contact_.domain);
+  // One that is yet to be chosen is looked at when it is.
+  if (frame.turns() && (!this->config_.adaptiveTimeStep || (forcesValid_ && !placesChanged()))) {
+    Epicycle<Scalar>::check(frame, h);
+  }
 }
 
-/// Checks all bodies; then forces, contacts and the step of the present places, if a body, its place, mass,
-/// radius or inertia was changed, or it became fixed or free, since they were found.
+/// Checks all bodies and a step of length h; then forces, contacts and the step of the present places, if a
+/// body, its place, mass, radius or inertia was changed, or it became fixed or free, since they were found.
 template <Real Scalar, class Layout>
-void Space<Scalar, Layout>::prepare() {
-  check();
+void Space<Scalar, Layout>::prepare(const Scalar& h) {
+  check(h);
   contact_.setIdle(false);  // until fallAsleep() has looked at those that came or woke
   for (wakeTheChanged(); !forcesValid_ || placesChanged(); wakeTheChanged()) {
     forcesValid_ = false;  // if a hook throws
