@@ -64,11 +64,12 @@ std::size_t Space<Scalar, Layout>::moveFewPoints(const Scalar& h, const Scalar* 
           const Profiler::Scope scope(profiler_, Phase::Integration);
           points.step(method, h, force_.field, gravity);
         }
-        if (until == nullptr || !points.isFinite() ||
-            !(stepTowards(Scalar(*until - timeAfter(h).first), h) == h)) {
+        const auto [now, low] = timeAfter(h);
+        if (until == nullptr || !points.isFinite() || !(stepTowards(Scalar((*until - now) - low), h) == h)) {
           break;
         }
-        std::tie(time_, timeRest_) = timeAfter(h);
+        time_ = now;
+        timeRest_ = low;
         ++steps_;
         ++more;
         timing.next();

@@ -42,7 +42,7 @@ void Space<Scalar, Layout>::advanceTo(Scalar time) {
   }
   const detail::StepInProgress::Scope inside(this->inStep_);
   while (time_ < time) {
-    const Scalar rest = time - time_;
+    const Scalar rest = (time - time_) - timeRest_;
     prepare(stepTowards(rest, dt_));
     const Scalar next = dt_;
     const Scalar h = stepTowards(rest, next);
