@@ -20,7 +20,8 @@ namespace detail {
 /// \tparam Support  `support(i)` [m s^-2]: what the contacts that hold body i add to its acceleration. What
 /// rests on something would else be seen to rise by g h/2 at the start of a step and to sink at its end: a
 /// ball on it would be thrown up for ever. `support.any(i)`: the same also of contacts that stop it.
-/// `support.fall(i)` [m s^-2]: against what they hold it, and `support.carried(i)`, of WayAhead, a part of it.
+/// `support.fall(i)` [m s^-2]: against what they hold it, and `support.carried(i)`, of WayAhead, a part of
+/// it.
 template <class S, class B, class Course, class Support = NoSupport>
 struct ImpactScene {
   B& bodies;
