@@ -34,6 +34,7 @@ struct NarrowPhaseSettings {
   std::span<const ContactKeys> settled{};  ///< more of these, sorted
   std::span<const ContactName> before{};   ///< with which those found are compared: facts()
   std::span<const Scalar> carried{};  ///< [m s^-2] by body, to be added to |a|: see WayAhead; empty is none
+  std::span<const Vector3<Scalar>> bend{};  ///< the same, of the frame: |a + bend| counts where it is larger
 };
 
 /// \throws std::invalid_argument naming the setting, its value and what is allowed
@@ -50,14 +51,17 @@ void validate(const NarrowPhaseSettings<S>& settings) {
 
 namespace detail {
 
-/// |a| of a body that contacts can move, with that of what carries it; else 0.
+/// |a| of a body that contacts can move, with what its frame adds and that of what carries it; else 0.
 template <Real S, class B>
 [[gnu::always_inline]] inline S accelerationOf(const NarrowPhaseSettings<S>& settings, const B& bodies,
                                                std::size_t i) {
   if (!isMovable(bodies, i)) {
     return S(0);
   }
-  const S own = safeNorm(Vector3<S>(bodies.accelerations()[i]));
+  S own = safeNorm(Vector3<S>(bodies.accelerations()[i]));
+  if (!settings.bend.empty()) {
+    own = std::max<S>(own, safeNorm(Vector3<S>(bodies.accelerations()[i] + settings.bend[i])));
+  }
   return settings.carried.empty() ? own : S(own + settings.carried[i]);
 }
 

@@ -35,7 +35,8 @@ struct ContactVirial {
   }
 };
 
-/// What presses on boundaries and fixed bodies, against the weight of all movable bodies in a uniform field.
+/// What presses on boundaries and fixed bodies, against the weight of all movable bodies in a uniform field;
+/// what a frame that turns presses is no weight.
 template <Real Scalar>
 struct SupportedWeight {
   Vector3<Scalar> load = Vector3<Scalar>::Zero();    ///< [N] on boundaries and fixed bodies, over the step

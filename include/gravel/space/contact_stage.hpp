@@ -112,13 +112,9 @@ class ContactStage {
     limitSweeps(settings, config.contactIterations, contacts_.size(), remembers_);
     solver_.setSettings(settings);
     solver_.rebind(contacts_);  // the space may be a copy
-    const HillFrame<Scalar> frame(domain);
-    bend_.resize(frame.turns() ? bodies.size() : 0);
-    parallelFor(bend_.size(), 512, [&](std::size_t i) {
-      bend_[i] = frame.acceleration(bodies.positions()[i], bodies.velocities()[i]);
-    });
+    findBends(bodies, drifts ? h : Scalar(0));
     const ContactReport<Scalar> half =
-        solver_.solve(bodies, h, {drifts, bend_, frame.omega, h / Scalar(2), carried_});
+        solver_.solve(bodies, h, {drifts, bend_, domain.omega(), h / Scalar(2), carried_});
     acted_ = half.iterations > 0;
     if (!acted_) {
       solver_.forget();  // its impulses are those of the solve before
@@ -256,6 +252,7 @@ class ContactStage {
   /// \param settled  blows, of which those that rest count like contacts
   void findCarried(const Bodies& bodies, const Scalar& h, std::span<const Impact<Scalar>> settled = {});
   void carryAll(const Bodies& bodies, const Scalar& h);
+  void findBends(const Bodies& bodies, const Scalar& ahead);
   Scalar fastestSwing() const;
   void renewGeometry(const Bodies& bodies, const Config& config, const Scalar& time);
 
@@ -297,7 +294,7 @@ class ContactStage {
   ContactSolver<Scalar> solver_;
   StepRecord<Scalar> record_;
   ContactReport<Scalar> report_;
-  std::vector<Vector3<Scalar>> bend_;  // of Hill's frame, at the last solve
+  std::vector<Vector3<Scalar>> bend_;  // of Hill's frame, of findBends()
   std::vector<Scalar> carried_;        // of WayAhead, for the contacts of the last drivePlanes()
   Scalar separationLoss_ = Scalar(0);
   bool idle_ = false;

@@ -85,15 +85,20 @@ std::size_t Space<Scalar, Layout>::chooseParts(const Scalar& h) {
   if (this->config_.contactSubsteps != 0) {
     return this->config_.contactSubsteps;
   }
+  const HillFrame<Scalar> frame(contact_.domain);
+  const auto accelerationOf = [&](std::uint32_t i) {
+    return Vector(bodies_.accelerations()[i] +
+                  frame.acceleration(bodies_.positions()[i], bodies_.velocities()[i]));
+  };
   Scalar rate_sq(0);
   for (const Contact<Scalar>& c : contacts()) {
     const bool boundary = c.second == staticPartner;
     Vector v = contacts().drift(c) - detail::velocityOf(bodies_, c.first);
-    Vector a = -Vector(bodies_.accelerations()[c.first]);
+    Vector a = -accelerationOf(c.first);
     Scalar r = bodies_.radii()[c.first];
     if (!boundary) {
       v += detail::velocityOf(bodies_, c.second);
-      a += Vector(bodies_.accelerations()[c.second]);
+      a += accelerationOf(c.second);
       const Scalar r2 = bodies_.radii()[c.second];
       r = r2 > Scalar(0) && (r2 < r || !(r > Scalar(0))) ? r2 : r;
     }
