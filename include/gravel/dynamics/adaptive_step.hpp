@@ -11,12 +11,15 @@
 /// step is h = eta min(tau_i); and no sphere moves by more than a quarter of its radius in a step, so that
 /// contacts are met before they are deep. In a sheared domain where nothing stands still velocities are those
 /// against the flow, so that a wide patch of a disc takes the steps of a narrow one; spheres that touch meet
-/// at (3/2) |Omega| (r_i + r_j) by the flow, so that of the largest r is added to their speeds. The rule for
-/// bodies under forces whose law is not known; under mutual gravity see encounter_step.hpp.
+/// at (3/2) |Omega| (r_i + r_j) by the flow, so that of the largest r is added to their speeds. Where
+/// something stands still in such a frame, a counts what that adds, which presses on it: by the forces alone
+/// a ball that the tide holds on a floor took steps of half an orbit. The rule for bodies under forces whose
+/// law is not known; under mutual gravity see encounter_step.hpp.
 
 #include <gravel/bodies/bodies.hpp>
 #include <gravel/core/check.hpp>
 #include <gravel/core/parallel.hpp>
+#include <gravel/dynamics/epicycle.hpp>
 #include <gravel/spatial/domain.hpp>
 
 #include <algorithm>
@@ -82,6 +85,7 @@ Scalar stepFromMotion(const Bodies<Scalar, Layout>& bodies, const Scalar& soften
   Sum mass(0);
   Vector3<Sum> v_sum = Vector3<Sum>::Zero();
   Vector3<Sum> a_sum = Vector3<Sum>::Zero();
+  const HillFrame<Scalar> frame(domain);
   Vector3<Scalar> low = bodies[0].position();
   Vector3<Scalar> high = low;
   const auto flow = detail::FlowLeftOut<Scalar>::of(bodies, anchored ? Domain<Scalar>::open() : domain);
@@ -109,7 +113,11 @@ Scalar stepFromMotion(const Bodies<Scalar, Layout>& bodies, const Scalar& soften
     }
     const Scalar r = body.radius();
     const Scalar l = std::max<Scalar>(r, floor);
-    const Scalar a = Vector3<Scalar>(body.acceleration() - a_cm).norm();
+    Vector3<Scalar> pull = body.acceleration() - a_cm;
+    if (frame.turns() && flow.domain.isOpen()) {
+      pull += frame.acceleration(body.position(), body.velocity());
+    }
+    const Scalar a = pull.norm();
     const Scalar v_sq =
         Vector3<Scalar>(flow.domain.lessFlow(body.position(), body.velocity()) - v_cm).squaredNorm();
     if (a > Scalar(0) && l > Scalar(0)) {
