@@ -89,7 +89,7 @@ class BoundaryContacts {
       if (!(wall.normal.dot(x) - wall.offset < radius + widestMargin(settings, radius))) {
         continue;
       }
-      const auto falls = [&] { return accelerationOf(settings, bodies, i); };
+      const auto falls = [&] { return accelerationOf(settings, bodies, i, true); };
       const S margin = marginOf(settings, radius, falls);
       const auto touch = sphereHalfSpace<S>(x, radius, wall.normal, wall.offset, margin);
       const auto approach = [&] {  // beyond what a plane that goes on changing its velocity brings

@@ -34,7 +34,10 @@ struct NarrowPhaseSettings {
   std::span<const ContactKeys> settled{};  ///< more of these, sorted
   std::span<const ContactName> before{};   ///< with which those found are compared: facts()
   std::span<const Scalar> carried{};  ///< [m s^-2] by body, to be added to |a|: see WayAhead; empty is none
-  std::span<const Vector3<Scalar>> bend{};  ///< the same, of the frame: |a + bend| counts where it is larger
+  /// The same, of the frame: of contacts with what stands still |a + bend| counts where it is larger, and
+  /// where bodies lean on that, of all. Of bodies that fly it is none: they meet by what they differ in.
+  std::span<const Vector3<Scalar>> bend{};
+  bool lean = false;
 };
 
 /// \throws std::invalid_argument naming the setting, its value and what is allowed
@@ -51,15 +54,16 @@ void validate(const NarrowPhaseSettings<S>& settings) {
 
 namespace detail {
 
-/// |a| of a body that contacts can move, with what its frame adds and that of what carries it; else 0.
+/// |a| of a body that contacts can move, with that of what carries it; else 0. \param leans  on what stands
+/// still in the frame
 template <Real S, class B>
 [[gnu::always_inline]] inline S accelerationOf(const NarrowPhaseSettings<S>& settings, const B& bodies,
-                                               std::size_t i) {
+                                               std::size_t i, bool leans) {
   if (!isMovable(bodies, i)) {
     return S(0);
   }
   S own = safeNorm(Vector3<S>(bodies.accelerations()[i]));
-  if (!settings.bend.empty()) {
+  if (leans && !settings.bend.empty()) {
     own = std::max<S>(own, safeNorm(Vector3<S>(bodies.accelerations()[i] + settings.bend[i])));
   }
   return settings.carried.empty() ? own : S(own + settings.carried[i]);

@@ -217,7 +217,9 @@ class NarrowPhase {
     const S distance = surely ? S(0) : detail::safeNorm(r_ij);
     const bool overlaps = surely || distance < reach + settings.margin;
     const auto falls = [&] {
-      return S(detail::accelerationOf(settings, bodies, i) + detail::accelerationOf(settings, bodies, j));
+      const bool lean = settings.lean || !detail::isMovable(bodies, i) || !detail::isMovable(bodies, j);
+      return S(detail::accelerationOf(settings, bodies, i, lean) +
+               detail::accelerationOf(settings, bodies, j, lean));
     };
     if (!(reach > S(0)) || (!overlaps && !(distance < reach + detail::marginOf(settings, reach, falls)))) {
       return false;

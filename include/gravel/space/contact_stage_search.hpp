@@ -57,6 +57,7 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
   settings.carried = carried_;
   findBends(bodies, Scalar(0));
   settings.bend = bend_;
+  settings.lean = !walls_.empty();
   contactsChanged();
   if (goesOn && searched && settings.resting->empty() && settings.settled.empty() && report_.postponed == 0 &&
       !grazed) {
