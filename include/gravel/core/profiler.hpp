@@ -63,6 +63,7 @@ class Profiler {
   struct Present {
     Present() = default;
     Present(const Present& /*other*/) noexcept {}
+    // NOLINTNEXTLINE(bugprone-unhandled-self-assignment): nothing is taken from anybody
     Present& operator=(const Present& /*other*/) noexcept { return *this; }
     ~Present() = default;
 
