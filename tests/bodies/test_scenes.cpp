@@ -34,21 +34,18 @@ TEST_CASE("scenes: radii follow their power law whatever the exponent", "[scenes
 
 // Seen to fail: all were made, of cells that were counted beyond all numbers.
 TEST_CASE("scenes: what is too wide for its spheres is refused", "[scenes]") {
-  scenes::CloudOptions cloud;
-  cloud.count = 3;
-  cloud.bodyRadius = {1e-20, 1e-20};
-  CHECK_THROWS_WITH(scenes::rubbleCloud<double>(cloud),
-                    "scene: the region is more than 1e15 of its largest spheres wide");
-  cloud.bodyRadius = {1e-12, 1e-12};
-  CHECK(scenes::rubbleCloud<double>(cloud).size() == 3);
-  CHECK_THROWS_WITH(scenes::Placement(1e-200, 1e200),
-                    "scene: the region is more than 1e15 of its largest spheres wide");
-
-  scenes::ColumnOptions column;
-  column.count = 3;
-  column.bodyRadius = {1e-12, 1e-12};
-  CHECK_THROWS_WITH(scenes::grainColumn<double>(column),
+  const auto withRadius = [](auto options, double radius) {
+    options.count = 3;
+    options.bodyRadius = {radius, radius};
+    return options;
+  };
+  const scenes::CloudOptions cloud;
+  const char* const region = "scene: the region is more than 1e15 of its largest spheres wide";
+  CHECK_THROWS_WITH(scenes::rubbleCloud<double>(withRadius(cloud, 1e-20)), region);
+  CHECK(scenes::rubbleCloud<double>(withRadius(cloud, 1e-12)).size() == 3);
+  CHECK_THROWS_WITH(scenes::Placement(1e-200, 1e200), region);
+  const scenes::ColumnOptions column;
+  CHECK_THROWS_WITH(scenes::grainColumn<double>(withRadius(column, 1e-12)),
                     "scene: the column is more than 65536 of its largest grains wide");
-  column.bodyRadius = {1e-6, 1e-6};
-  CHECK(scenes::grainColumn<double>(column).size() == 3);
+  CHECK(scenes::grainColumn<double>(withRadius(column, 1e-6)).size() == 3);
 }
