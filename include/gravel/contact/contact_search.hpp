@@ -34,10 +34,10 @@ struct NarrowPhaseSettings {
   std::span<const ContactKeys> settled{};  ///< more of these, sorted
   std::span<const ContactName> before{};   ///< with which those found are compared: facts()
   std::span<const Scalar> carried{};  ///< [m s^-2] by body, to be added to |a|: see WayAhead; empty is none
-  /// The same, of the frame: of contacts with what stands still |a + bend| counts where it is larger, and
-  /// where bodies lean on that, of all. Of bodies that fly it is none: they meet by what they differ in.
+  /// The same, of the frame: of contacts with what stands still |a + bend| counts where it is larger, and of
+  /// those between bodies that lean on that. Of bodies that fly it is none: they meet by what they differ in.
   std::span<const Vector3<Scalar>> bend{};
-  bool lean = false;
+  std::span<const std::uint8_t> leaning{};  ///< by body, whether it leans on what stands still; empty is none
 };
 
 /// \throws std::invalid_argument naming the setting, its value and what is allowed

@@ -217,7 +217,8 @@ class NarrowPhase {
     const S distance = surely ? S(0) : detail::safeNorm(r_ij);
     const bool overlaps = surely || distance < reach + settings.margin;
     const auto falls = [&] {
-      const bool lean = settings.lean || !detail::isMovable(bodies, i) || !detail::isMovable(bodies, j);
+      const bool bothLean = !settings.leaning.empty() && settings.leaning[i] != 0 && settings.leaning[j] != 0;
+      const bool lean = bothLean || !detail::isMovable(bodies, i) || !detail::isMovable(bodies, j);
       return S(detail::accelerationOf(settings, bodies, i, lean) +
                detail::accelerationOf(settings, bodies, j, lean));
     };

@@ -253,6 +253,8 @@ class ContactStage {
   void findCarried(const Bodies& bodies, const Scalar& h, std::span<const Impact<Scalar>> settled = {});
   void carryAll(const Bodies& bodies, const Scalar& h);
   void findBends(const Bodies& bodies, const Scalar& ahead);
+  void findLeaning(const Bodies& bodies, bool goesOn);
+  std::vector<ContactName> whoTouches(std::span<const Impact<Scalar>> settled) const;
   Scalar fastestSwing() const;
   void renewGeometry(const Bodies& bodies, const Config& config, const Scalar& time);
 
@@ -295,6 +297,7 @@ class ContactStage {
   StepRecord<Scalar> record_;
   ContactReport<Scalar> report_;
   std::vector<Vector3<Scalar>> bend_;  // of Hill's frame, of findBends()
+  std::vector<std::uint8_t> leaning_;  // by body, of findLeaning()
   std::vector<Scalar> carried_;        // of WayAhead, for the contacts of the last drivePlanes()
   Scalar separationLoss_ = Scalar(0);
   bool idle_ = false;

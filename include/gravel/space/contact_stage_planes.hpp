@@ -1,7 +1,7 @@
 #pragma once
 
 /// \file
-/// Members of `ContactStage` that concern planes which move.
+/// Members of `ContactStage` that concern planes which move, and who leans on what.
 
 #include <gravel/contact/contact_islands.hpp>
 #include <gravel/space/contact_stage.hpp>
@@ -35,15 +35,7 @@ void ContactStage<Scalar, Layout>::findCarried(const Bodies& bodies, const Scala
   if (!(fastestSwing() > Scalar(0))) {
     return;
   }
-  std::vector<ContactName> leaning;
-  for (const Contact<Scalar>& c : contacts_) {
-    leaning.push_back(ContactName::of(c));
-  }
-  for (const Impact<Scalar>& impact : settled) {
-    if (impact.rests) {
-      leaning.push_back({impact.keys(), impact.first, impact.second});
-    }
-  }
+  const std::vector<ContactName> touching = whoTouches(settled);
   const auto speedUp = [&](std::uint64_t key) {
     for (const Plane<Scalar>& plane : boundaries.planes()) {
       if (boundaryKey(plane.number) == key) {
@@ -53,9 +45,9 @@ void ContactStage<Scalar, Layout>::findCarried(const Bodies& bodies, const Scala
     return Scalar(0);
   };
   ContactIslands islands;
-  islands.find(std::span<const ContactName>(leaning), bodies);
+  islands.find(std::span<const ContactName>(touching), bodies);
   carried_.assign(bodies.size(), Scalar(0));
-  for (const ContactName& name : leaning) {
+  for (const ContactName& name : touching) {
     if (name.second == staticPartner) {
       Scalar& most = carried_[islands.of(name.first)];
       most = std::max<Scalar>(most, speedUp(name.keys.second));
@@ -71,6 +63,59 @@ template <Real Scalar, class Layout>
 void ContactStage<Scalar, Layout>::carryAll(const Bodies& bodies, const Scalar& h) {
   const Scalar most = fastestSwing();
   carried_.assign(most > Scalar(0) ? bodies.size() : 0, Scalar(Scalar(2) * most / h));
+}
+
+/// What leans on something that stands still in a turning frame, itself or through others: nothing answers
+/// there to what the frame adds. While it is not known who leans on whom, all do, if anything stands still.
+/// O(bodies + contacts) in such a frame.
+template <Real Scalar, class Layout>
+void ContactStage<Scalar, Layout>::findLeaning(const Bodies& bodies, bool goesOn) {
+  leaning_.clear();
+  if (bend_.empty()) {
+    return;
+  }
+  const auto isStill = [&](std::uint32_t i) { return i == staticPartner || !detail::isMovable(bodies, i); };
+  if (!goesOn) {
+    bool anyStill = !walls_.empty();
+    for (std::uint32_t i = 0; i < bodies.size() && !anyStill; ++i) {
+      anyStill = isStill(i);
+    }
+    leaning_.assign(anyStill ? bodies.size() : 0, 1);
+    return;
+  }
+  const std::vector<ContactName> touching = whoTouches(impacts_.impacts());
+  const auto stands = [&](const ContactName& name) { return isStill(name.first) || isStill(name.second); };
+  if (std::none_of(touching.begin(), touching.end(), stands)) {
+    return;
+  }
+  ContactIslands islands;
+  islands.find(std::span<const ContactName>(touching), bodies);
+  leaning_.assign(bodies.size(), 0);
+  for (const ContactName& name : touching) {
+    if (stands(name)) {
+      leaning_[islands.of(isStill(name.first) ? name.second : name.first)] = 1;
+    }
+  }
+  for (std::size_t i = 0; i < bodies.size(); ++i) {  // an island's name is its smallest index
+    leaning_[i] = leaning_[islands.of(i)];
+  }
+}
+
+/// Names of the contacts, and of those blows at whose end a pair rested.
+template <Real Scalar, class Layout>
+std::vector<ContactName> ContactStage<Scalar, Layout>::whoTouches(
+    std::span<const Impact<Scalar>> settled) const {
+  std::vector<ContactName> all;
+  all.reserve(contacts_.size());
+  for (const Contact<Scalar>& c : contacts_) {
+    all.push_back(ContactName::of(c));
+  }
+  for (const Impact<Scalar>& impact : settled) {
+    if (impact.rests) {
+      all.push_back({impact.keys(), impact.first, impact.second});
+    }
+  }
+  return all;
 }
 
 /// [m s^-1] >= 0, of the planes that speed up into what leans on them.

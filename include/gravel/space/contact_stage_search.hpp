@@ -55,9 +55,6 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
   }
   settings.before = solver_.names();
   settings.carried = carried_;
-  findBends(bodies, Scalar(0));
-  settings.bend = bend_;
-  settings.lean = !walls_.empty();
   contactsChanged();
   if (goesOn && searched && settings.resting->empty() && settings.settled.empty() && report_.postponed == 0 &&
       !grazed) {
@@ -66,6 +63,10 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
     return;
   }
   const Profiler::Scope scope(profiler, Phase::NarrowPhase);
+  findBends(bodies, Scalar(0));
+  findLeaning(bodies, goesOn);
+  settings.bend = bend_;
+  settings.leaning = leaning_;
   narrow_.find(neighbours_.pairs(), bodies, domain, materials.view(), walls_, settings, contacts_,
                nearBoundaries(bodies, Scalar(0)));
   carried_.clear();
