@@ -3,7 +3,7 @@
 /// \file
 /// An order in which contacts can be solved at once: no two contacts of one colour share a movable body.
 
-#include <gravel/contact/contact_facts.hpp>
+#include <gravel/contact/contact_slots.hpp>
 #include <gravel/contact/row_parts.hpp>
 #include <gravel/contact/solver_islands.hpp>
 #include <gravel/core/check.hpp>
@@ -21,26 +21,20 @@
 
 namespace gravel {
 
-/// Colours of the contacts, greedily in the order of the list, which is that of the keys: a function of ids
-/// alone. Fixed bodies and boundaries take part in any number of contacts of a colour. Contacts that find no
-/// colour among 62 (of a body with very many partners) go to an overflow group that is solved serially.
-/// Contacts that share no movable body with any other make up a group of their own, the lone ones, which are
-/// exact after one blow. Of more bodies than caches hold, contacts within a block of bodies whose ids follow
-/// each other come block by block, and in each colour by colour, before the contacts between blocks: bodies
-/// are fetched once in place of once a colour, and blocks are solved at once.
-/// O(contacts), with a sort of those bodies that are first in no contact, and O(bodies) once for the largest
-/// number of them.
+/// Colours of the contacts, greedily in the order of the list, which is that of the keys, in each block: a
+/// function of ids alone. Fixed bodies and boundaries take part in any number of contacts of a colour.
+/// Contacts that find no colour among 62 (of a body with very many partners) go to an overflow group that is
+/// solved serially. Contacts that share no movable body with any other make up a group of their own, the lone
+/// ones, which are exact after one blow. Of more bodies than caches hold, contacts within a block of bodies
+/// whose ids follow each other come block by block, and in each colour by colour, before the contacts between
+/// blocks: bodies are fetched once in place of once a colour, and blocks are solved at once. O(contacts),
+/// with a sort of those bodies that are first in no contact, and O(bodies) once for the largest number of
+/// them.
 class ContactColoring {
  public:
   static constexpr std::size_t maxColours = 62;
 
-  /// Slots: the bodies that take part, numbered from 0 in the order of ids; the last one, `staticSlot()`,
-  /// stands for boundaries.
-  struct Row {
-    std::uint32_t contact;  ///< index in the list
-    std::uint32_t slot1;
-    std::uint32_t slot2;
-  };
+  using Row = detail::SlotRow;
 
   /// \param contacts sorted by keys, which are the ids of the bodies
   /// \throws std::invalid_argument for a contact of a body that is not there, or of a body with itself, or
@@ -48,14 +42,14 @@ class ContactColoring {
   template <Real S, ContactBodies B>
   void build(std::span<const Contact<S>> contacts, const B& bodies) {
     takeEnds(contacts, bodies.size());
-    number(bodies);
-    islands_.find(std::span<const Row>(byContact_), movable_);
-    islands_.bundle(std::span<const Row>(byContact_), degree_, maxColours);
+    slots_.number(byContact_, bodies);
+    islands_.find(std::span<const Row>(byContact_), slots_.movable());
+    islands_.bundle(std::span<const Row>(byContact_), slots_.degree(), maxColours);
     choose();
     arrange();
     islands_.forgetNumbers();
     detail::giveBack(byContact_);
-    detail::giveBack(degree_);
+    slots_.forgetDegrees();
     detail::giveBack(group_);
     detail::giveBack(used_);
   }
@@ -68,7 +62,7 @@ class ContactColoring {
   std::size_t loneCount() const { return loneCount_; }
   const detail::SolverIslands& islands() const { return islands_; }
   /// The slot of the two by which islands() knows a row.
-  std::uint32_t ofIsland(const Row& row) const { return movable_[row.slot1] != 0 ? row.slot1 : row.slot2; }
+  std::uint32_t ofIsland(const Row& row) const { return movable(row.slot1) ? row.slot1 : row.slot2; }
   std::size_t islandsEnd() const { return islandsEnd_; }  ///< where rows of small islands end
   bool isOfLarge(std::size_t k) const { return k >= islandsEnd_; }
   /// The number of that of row k, if loneCount() <= k < islandsEnd().
@@ -97,14 +91,11 @@ class ContactColoring {
   std::size_t partsOfTask() const { return parts_.ofTask(); }
 
   /// Body of each slot.
-  std::span<const std::uint32_t> bodies() const { return bodyOfSlot_; }
-  std::uint32_t staticSlot() const { return static_cast<std::uint32_t>(bodyOfSlot_.size()); }
-  bool movable(std::uint32_t slot) const { return movable_[slot] != 0; }
+  std::span<const std::uint32_t> bodies() const { return slots_.bodies(); }
+  std::uint32_t staticSlot() const { return slots_.staticSlot(); }
+  bool movable(std::uint32_t slot) const { return slots_.movable()[slot] != 0; }
   /// Slot of a body; staticSlot() if it has none.
-  std::uint32_t slotOf(std::uint32_t body) const {
-    const std::uint32_t slot = body < slotOfBody_.size() ? slotOfBody_[body] : none;
-    return slot == none ? staticSlot() : slot;
-  }
+  std::uint32_t slotOf(std::uint32_t body) const { return slots_.of(body); }
 
  private:
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
@@ -112,6 +103,8 @@ class ContactColoring {
   static constexpr std::uint8_t overflow = 2 * maxColours;
   static constexpr std::uint8_t lone = overflow + 1;
   static constexpr std::uint8_t inBundle = lone + 1;  ///< and above, by colour
+  static constexpr std::uint8_t open = 255;           ///< not chosen yet
+  static_assert(inBundle + maxColours < open);
 
   static constexpr std::size_t chunk = 8192;
   /// Slots of a block: the velocities of so many are a quarter of a megabyte in double.
@@ -131,89 +124,99 @@ class ContactColoring {
     });
   }
 
-  /// Slots in the order of ids. Contacts come in the order of their first keys, so that only those bodies
-  /// that are first in none need to be sorted.
-  template <ContactBodies B>
-  void number(const B& bodies) {
-    for (const std::uint32_t body : bodyOfSlot_) {
-      slotOfBody_[body] = none;
-    }
-    slotOfBody_.resize(std::max(slotOfBody_.size(), bodies.size()), none);
-    bodyOfSlot_.clear();
-    bodyOfSlot_.reserve(bodies.size());
-    const auto take = [&](std::uint32_t body) {
-      if (slotOfBody_[body] == none) {
-        slotOfBody_[body] = 0;
-        bodyOfSlot_.push_back(body);
-      }
-    };
-    for (const Row& row : byContact_) {
-      take(row.slot1);
-    }
-    const auto firsts = static_cast<std::ptrdiff_t>(bodyOfSlot_.size());
-    for (const Row& row : byContact_) {
-      if (row.slot2 != staticPartner) {
-        take(row.slot2);
-      }
-    }
-    auto&& ids = bodies.ids();
-    const auto before = [&](std::uint32_t a, std::uint32_t b) { return ids[a] < ids[b]; };
-    std::sort(bodyOfSlot_.begin() + firsts, bodyOfSlot_.end(), before);
-    std::inplace_merge(bodyOfSlot_.begin(), bodyOfSlot_.begin() + firsts, bodyOfSlot_.end(), before);
-    movable_.clear();
-    movable_.reserve(staticSlot() + 1);
-    for (std::uint32_t slot = 0; slot < staticSlot(); ++slot) {
-      slotOfBody_[bodyOfSlot_[slot]] = slot;
-      movable_.push_back(detail::isMovable(bodies, bodyOfSlot_[slot]) ? 1 : 0);
-    }
-    movable_.push_back(0);
-    degree_.assign(movable_.size(), 0);
-    for (Row& row : byContact_) {
-      row.slot1 = slotOfBody_[row.slot1];
-      row.slot2 = row.slot2 == staticPartner ? staticSlot() : slotOfBody_[row.slot2];
-      degree_[row.slot1] += movable_[row.slot1];
-      degree_[row.slot2] += movable_[row.slot2];
-    }
-  }
-
   /// Of each contact its group, and how many of each group there are among those whose first bodies are of
-  /// one block, which are neighbours in the list.
+  /// one block, which are neighbours in the list. Those within blocks find their colours block by block, and
+  /// the others afterwards, as if there were no others.
   void choose() {
-    constexpr std::uint64_t all = (std::uint64_t{1} << maxColours) - 1;
-    used_.assign(movable_.size(), 0);
+    detail::assignSparingly(used_, slots_.movable().size(), std::uint64_t{0});
     detail::resizeSparingly(group_, byContact_.size());
     places_.assign(blockOf(staticSlot()) + 1, Places{});
     bundled_.assign(bundles(), {});
-    colours_ = 0;
     const bool inBlocks = staticSlot() > fewBodies;
-    for (std::size_t k = 0; k < byContact_.size(); ++k) {
-      const auto [contact, slot1, slot2] = byContact_[k];
-      if (k > 0 && slot1 < byContact_[k - 1].slot1) {
-        detail::refuse("place of a contact", std::to_string(k), "that in the order of keys");
-      }
-      const std::size_t block = blockOf(slot1);
-      group_[k] = lone;
-      if (degree_[slot1] > 1 || degree_[slot2] > 1) {
-        const std::uint64_t free = ~(used_[slot1] | used_[slot2]) & all;
-        group_[k] = overflow;
-        if (free != 0) {
-          const auto colour = static_cast<std::uint8_t>(std::countr_zero(free));
-          colours_ = std::max<std::size_t>(colours_, colour + 1U);
-          used_[slot1] |= std::uint64_t{movable_[slot1]} << colour;
-          used_[slot2] |= std::uint64_t{movable_[slot2]} << colour;
-          const std::uint32_t island = islands_.numberOf(ofIsland(byContact_[k]));
-          if (island != detail::SolverIslands::none) {
-            group_[k] = static_cast<std::uint8_t>(inBundle + colour);
-            ++bundled_[islands_.bundleOf(island)][colour];
-            ++places_[block][inBundle];
-            continue;
-          }
-          const bool within = inBlocks && (movable_[slot2] == 0 || blockOf(slot2) == block);
-          group_[k] = static_cast<std::uint8_t>(within ? colour : maxColours + colour);
-        }
-      }
-      ++places_[block][group_[k]];
+    if (inBlocks) {
+      parallelForTasks<Share::Alike>(places_.size(), [&](std::size_t block) { chooseWithin(block); });
+      parallelFor(used_.size(), chunk, [&](std::size_t slot) { used_[slot] = 0; });
     }
+    for (std::size_t k = 0; k < byContact_.size(); ++k) {
+      if (inBlocks && group_[k] != open) {
+        continue;
+      }
+      const Row& row = byContact_[k];
+      Places& places = places_[blockOf(row.slot1)];
+      if (isLone(row)) {
+        group_[k] = lone;
+        ++places[lone];
+        continue;
+      }
+      const std::uint8_t colour = takeColour(row);
+      group_[k] = overflow;
+      const std::uint32_t island = islands_.numberOf(ofIsland(row));
+      if (colour < maxColours && island != detail::SolverIslands::none) {
+        group_[k] = static_cast<std::uint8_t>(inBundle + colour);
+        ++bundled_[islands_.bundleOf(island)][colour];
+        ++places[inBundle];
+        continue;
+      }
+      if (colour < maxColours) {
+        group_[k] = static_cast<std::uint8_t>(maxColours + colour);
+      }
+      ++places[group_[k]];
+    }
+    colours_ = 0;
+    const auto count = [&](const auto& places, std::size_t first) {
+      for (std::size_t colour = colours_; colour < maxColours; ++colour) {
+        colours_ = places[first + colour] > 0 ? colour + 1 : colours_;
+      }
+    };
+    for (const Places& places : places_) {
+      count(places, 0);
+      count(places, maxColours);
+    }
+    for (const auto& places : bundled_) {
+      count(places, 0);
+    }
+  }
+
+  /// The same of the contacts within a block; those of the others, and of small islands, stay `open`.
+  void chooseWithin(std::size_t block) {
+    const auto first = std::partition_point(byContact_.begin(), byContact_.end(),
+                                            [&](const Row& row) { return blockOf(row.slot1) < block; });
+    Places& places = places_[block];
+    for (auto k = static_cast<std::size_t>(first - byContact_.begin());
+         k < byContact_.size() && blockOf(byContact_[k].slot1) == block; ++k) {
+      const Row& row = byContact_[k];
+      group_[k] = open;
+      if (isLone(row)) {
+        group_[k] = lone;
+        ++places[lone];
+      } else if ((!movable(row.slot2) || blockOf(row.slot2) == block) &&
+                 islands_.numberOf(ofIsland(row)) == detail::SolverIslands::none) {
+        const std::uint8_t colour = takeColour(row);
+        group_[k] = colour < maxColours ? colour : overflow;
+        ++places[group_[k]];
+      }
+    }
+  }
+
+  bool isLone(const Row& row) const {
+    return slots_.degree()[row.slot1] < 2 && slots_.degree()[row.slot2] < 2;
+  }
+
+  /// The first colour that neither body of a row has so far; maxColours if there is none.
+  std::uint8_t takeColour(const Row& row) {
+    constexpr std::uint64_t all = (std::uint64_t{1} << maxColours) - 1;
+    const auto [contact, slot1, slot2] = row;
+    const std::uint64_t free = ~(used_[slot1] | used_[slot2]) & all;
+    if (free == 0) {
+      return maxColours;
+    }
+    const auto colour = static_cast<std::uint8_t>(std::countr_zero(free));
+    for (const std::uint32_t slot : {slot1, slot2}) {
+      if (movable(slot)) {  // the others are shared between blocks
+        used_[slot] |= std::uint64_t{1} << colour;
+      }
+    }
+    return colour;
   }
 
   /// Rows by group, within one in the order of contacts.
@@ -305,12 +308,9 @@ class ContactColoring {
   std::vector<std::array<std::size_t, maxColours>> bundled_;  ///< by bundle, of its next row in each colour
   std::size_t colours_ = 0;
   std::vector<std::size_t> start_{0, 0};
-  std::vector<std::uint32_t> bodyOfSlot_;
-  std::vector<std::uint32_t> slotOfBody_;
-  std::vector<std::uint8_t> movable_;
+  detail::ContactSlots slots_;
   // While it is built:
   std::vector<Row> byContact_;
-  std::vector<std::uint32_t> degree_;
   std::vector<std::uint8_t> group_;
   std::vector<std::uint64_t> used_;
 };

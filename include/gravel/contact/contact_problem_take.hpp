@@ -36,9 +36,9 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   detail::resizeSparingly(marks, contacts.size());
   detail::resizeSparingly(gaps_, contacts.size());
   detail::resizeSparingly(turning, kinds.turn ? contacts.size() : 0);
-  const bool slips =
-      friction && (kinds.drift || kinds.spring || (way.follows && (this->turns_ || !way.bend.empty())));
-  detail::assignSparingly(slipTargets, slips ? rows.size() : 0, Vector3<S>(Vector3<S>::Zero()));
+  const bool slips = friction && (kinds.drift || kinds.spring || bends || (way.follows && this->turns_));
+  detail::resizeSparingly(slipTargets, slips ? rows.size() : 0);
+  parallelFor(slipTargets.size(), chunk, [&](std::size_t k) { slipTargets[k].setZero(); });
   // A slip is at most of four speeds and spins of three components.
   const S fall = speedIn(S(this->leastFall_ * dt));
   const bool lasts = drifting || S(7) * this->fastest_ > detail::RowBefore<S>::lasting() * fall;

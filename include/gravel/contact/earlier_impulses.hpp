@@ -83,21 +83,29 @@ class EarlierImpulses {
   template <ContactBodies B>
   void findEnded(std::span<const Contact<S>> contacts, std::span<const SolverRow<S>> solved, const B& bodies,
                  std::vector<EndedContact<S>>& ended) const {
-    auto c = contacts.begin();
-    for (std::size_t k = 0; k < names_.size(); ++k) {
-      const auto& [keys, first, second] = names_[k];
-      while (c != contacts.end() && ContactName::of(*c).keys < keys) {
-        ++c;
+    std::vector<std::vector<EndedContact<S>>> parts(Chunks(names_.size(), fewNames).count());
+    parallelForChunks<Share::Alike>(names_.size(), fewNames, [&](std::size_t begin, std::size_t end) {
+      auto c = std::lower_bound(
+          contacts.begin(), contacts.end(), names_[begin].keys,
+          [](const Contact<S>& contact, const ContactKeys& keys) { return contact.keys() < keys; });
+      for (std::size_t k = begin; k < end; ++k) {
+        const auto& [keys, first, second] = names_[k];
+        while (c != contacts.end() && c->keys() < keys) {
+          ++c;
+        }
+        const bool goesOn = c != contacts.end() && c->keys() == keys;
+        const bool there = first < bodies.size() && (second < bodies.size() || second == staticPartner);
+        if (!goesOn && there && impulses_.normal(rowOf_[k]) > S(0)) {
+          const SolverRow<S>& row = solved[rowOf_[k]];
+          const S arm1 = row.c1 * S(bodies.radii()[first]);
+          const S arm2 = second == staticPartner ? S(0) : S(row.c2 * S(bodies.radii()[second]));
+          parts[begin / fewNames].push_back(
+              {{first, second, keys.first, keys.second, row.n, S(0), arm1, arm2}, impulses_.get(rowOf_[k])});
+        }
       }
-      const bool goesOn = c != contacts.end() && ContactName::of(*c).keys == keys;
-      const bool there = first < bodies.size() && (second < bodies.size() || second == staticPartner);
-      if (!goesOn && there && impulses_.normal(rowOf_[k]) > S(0)) {
-        const SolverRow<S>& row = solved[rowOf_[k]];
-        const S arm1 = row.c1 * S(bodies.radii()[first]);
-        const S arm2 = second == staticPartner ? S(0) : S(row.c2 * S(bodies.radii()[second]));
-        ended.push_back(
-            {{first, second, keys.first, keys.second, row.n, S(0), arm1, arm2}, impulses_.get(rowOf_[k])});
-      }
+    });
+    for (const std::vector<EndedContact<S>>& part : parts) {
+      ended.insert(ended.end(), part.begin(), part.end());
     }
   }
 
@@ -129,6 +137,7 @@ class EarlierImpulses {
 
  private:
   static constexpr std::size_t chunk = 512;
+  static constexpr std::size_t fewNames = 4096;
 
   std::vector<ContactName> names_;
   ImpulseList<S> impulses_;           ///< in the order of their rows
