@@ -1,6 +1,7 @@
 // Dual numbers through the integrators: the derivative of the end with respect to the start.
 #include "scenes/scenes.hpp"
 #include "support/catch.hpp"
+#include <gravel/core/sizes.hpp>
 #include <gravel/dynamics/encounter_step.hpp>
 #include <gravel/dynamics/gauss_radau.hpp>
 #include <gravel/dynamics/hermite.hpp>
@@ -130,4 +131,25 @@ TEST_CASE("Derivatives through Hermite's block steps are those of finite differe
 TEST_CASE("Derivatives through Gauss-Radau and Wisdom-Holman are those of finite differences") {
   compare(IntegratorKind::GaussRadau15, false);
   compare(IntegratorKind::WisdomHolman, false);
+}
+
+// Seen to fail: the root of zero, whose derivative is no number.
+TEST_CASE("The length of a zero vector of dual numbers is zero, without a derivative") {
+  const Vector3<Dual> v(Dual(0.0, Eigen::Vector2d(1, 0)), Dual(0.0, Eigen::Vector2d(0, 0)),
+                        Dual(0.0, Eigen::Vector2d(0, 2)));
+  const Dual length = detail::safeNorm(v);
+  CHECK(length.value() == 0);
+  CHECK(Eigen::Vector2d(length.derivatives()) == Eigen::Vector2d::Zero());
+}
+
+// q_z = sin(w_z t/2), at w = 0 with the derivative t/2. Seen to fail: no turn at a spin that is zero.
+TEST_CASE("Orientations know the derivative of a spin that is zero") {
+  Bodies<Dual> bodies;
+  Body<Dual> body;
+  body.angularVelocity[2] = Dual(0.0, Eigen::Vector2d(1, 0));
+  bodies.add(body);
+  detail::kickAndDrift<Dual>(bodies, Dual(0), Dual(0.3), false, nullptr);
+  const Quaternion<Dual> q(bodies[0].orientation());
+  CHECK(q.z().value() == 0);
+  CHECK(std::abs(q.z().derivatives()[0] - 0.15) < 1e-15);
 }

@@ -29,7 +29,7 @@ struct ContactKinds {
     grip = grip || surface.material.staticFriction > surface.material.kineticFriction;
     turn = turn || surface.material.rollingFriction > S(0) || surface.material.spinningFriction > S(0);
     spring = spring || surface.material.tangentialRestitution > S(0);
-    drift = drift || !(surface.drift == Vector3<S>::Zero());
+    drift = drift || !detail::equalIsSame<S> || !(surface.drift == Vector3<S>::Zero());
   }
   ContactKinds& operator+=(const ContactKinds& other) {
     rub = rub || other.rub;

@@ -14,14 +14,6 @@
 
 namespace gravel {
 
-namespace detail {
-
-/// A user's scalar may be more than its value, a derivative say: equal is not the same.
-template <Real S>
-inline constexpr bool equalIsSame = std::is_floating_point_v<S>;
-
-}  // namespace detail
-
 /// What is between the two sides of a contact.
 template <Real Scalar>
 struct ContactSurface {

@@ -178,9 +178,8 @@ class ContactSolver {
           for (std::size_t r = begin; r < end; ++r) {
             const ContactColoring::Row& place = coloring_.rows()[r];
             const Vector3<S> change = changes[place.slot2] - changes[place.slot1];
-            // None between two that fall alike: their row is not fetched. A user's scalar may
-            // be more than its value, a derivative say.
-            const bool any = !std::is_floating_point_v<S> || change != Vector3<S>::Zero();
+            // None between two that fall alike: their row is not fetched.
+            const bool any = !detail::equalIsSame<S> || change != Vector3<S>::Zero();
             if (any && rowImpulses_.normal(r) > S(0)) {
               sums += Sums(rowImpulses_.normal(r) * problem_.rows[r].n.dot(change),
                            rowImpulses_.tangential(r).dot(change));

@@ -116,7 +116,7 @@ class ImpactCourses : protected ImpactForecast<S> {
   template <class Scene>
   void twist(const Scene& scene, std::uint32_t i, const S& mobility, const Vector3<S>& stroke, const S& t) {
     const S r = scene.bodies.radii()[i];
-    if (!(mobility == S(0)) && r > S(0) && !(stroke == Vector3<S>::Zero())) {
+    if (!(mobility == S(0)) && r > S(0) && (!detail::equalIsSame<S> || !(stroke == Vector3<S>::Zero()))) {
       const Vector3<S> before = scene.bodies.angularVelocities()[i];
       turn(scene, i, Vector3<S>(before - (mobility / r) * scene.course.spinAtStart(stroke, t)), t);
     }

@@ -129,10 +129,11 @@ class ProblemBodies {
     auto&& radii = target.radii();
     for (std::size_t slot = begin; slot < end; ++slot) {
       const std::uint32_t i = colouring.bodies()[slot];
-      if (bodies[slot].v != initial[slot].v) {
+      const bool always = !equalIsSame<S> && colouring.movable(static_cast<std::uint32_t>(slot));
+      if (always || bodies[slot].v != initial[slot].v) {
         velocities[i] = scaled<S>(bodies[slot].v, -speedExponent_);
       }
-      if (friction && bodies[slot].s != initial[slot].s) {
+      if (friction && ((always && radii[i] > S(0)) || bodies[slot].s != initial[slot].s)) {
         spins[i] = Vector3<S>(scaled<S>(bodies[slot].s, -speedExponent_) / radii[i]);
       }
     }

@@ -60,6 +60,8 @@ template <Real Scalar>
     if (!(sq > tiny) || !(sq < std::numeric_limits<Scalar>::max())) {
       return scaledNorm(v);
     }
+  } else if (sq == Scalar(0)) {  // the root of a dual number has no derivative there
+    return Scalar(0);
   }
   return Scalar(sqrt(sq));
 }

@@ -54,6 +54,14 @@ concept Real = !std::is_integral_v<T> && std::semiregular<T> && std::constructib
   detail::rootOf(b);
 };
 
+namespace detail {
+
+/// A user's scalar may be more than its value, a derivative say: equal is not the same.
+template <Real S>
+inline constexpr bool equalIsSame = std::is_floating_point_v<S>;
+
+}  // namespace detail
+
 template <Real Scalar>
 using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
 

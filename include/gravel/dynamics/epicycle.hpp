@@ -159,7 +159,7 @@ void integrateEpicycle(const HillFrame<Scalar>& frame, Bodies<Scalar, Layout>& b
     body.position() += dx;
     body.velocity() += dv;
     Vector3<Scalar> w = body.angularVelocity();
-    if (!(w.squaredNorm() == Scalar(0))) {
+    if (!detail::equalIsSame<Scalar> || !(w.squaredNorm() == Scalar(0))) {
       Quaternion<Scalar> q(body.orientation());
       epicycle.turn(q, w);
       body.orientation() = q;

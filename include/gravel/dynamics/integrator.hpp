@@ -43,7 +43,7 @@ void kickAndDriftOne(Bodies<Scalar, Layout>& bodies, std::size_t i, const Scalar
       body.position() += times(body.velocity(), drift);
     }
     const Vector3<Scalar> spin = body.angularVelocity();
-    if (!(spin.squaredNorm() == Scalar(0))) {
+    if (!equalIsSame<Scalar> || !(spin.squaredNorm() == Scalar(0))) {
       body.orientation() = rotated(Quaternion<Scalar>(body.orientation()), spin, drift);
     }
   }

@@ -119,7 +119,7 @@ class OrbitStage {
         body.angularVelocity() += body.angularAcceleration() * kick;
       }
       const Vector3<Scalar> w = body.angularVelocity();
-      if (!(drift == Scalar(0)) && !(w.squaredNorm() == Scalar(0))) {
+      if (!(drift == Scalar(0)) && (!detail::equalIsSame<Scalar> || !(w.squaredNorm() == Scalar(0)))) {
         body.orientation() = rotated(Quaternion<Scalar>(body.orientation()), w, drift);
       }
     });
