@@ -137,15 +137,18 @@ TEST_CASE("A point at rest in a field asks for no step of zero") {
   CHECK(stepFromMotion(bodies, 0.0, wide, true) == wide.largest);
 }
 
-// In Hill's frame, Omega = 2 and nu = 3, as under forces of that strength. Seen to fail: by the forces alone,
-// of which there are none, it asked for no step at all, or for that of its speed.
+// In Hill's frame, Omega = 2 and nu = 3, as under forces of that strength; and with nu alone. Seen to fail:
+// by the forces alone, of which there are none, it asked for no step at all, or for that of its speed; fixed
+// bodies forgotten where Omega is 0.
 TEST_CASE("Where something stands still, what the frame adds counts as a force does") {
-  const Domain<double> patch = Domain<double>::shearPeriodic({100, 100, 100}, 2.0, 3.0);
+  const double omega = GENERATE(2.0, 0.0);
+  CAPTURE(omega);
+  const Domain<double> patch = Domain<double>::shearPeriodic({100, 100, 100}, omega, 3.0);
   for (const Vec& v : {Vec(0, 0, 0), Vec(1e-3, -2e-3, 1e-3)}) {
     const Vec x(1, 2, -4);
     Bodies<double> inFrame, forced;
     add(inFrame, x, v, {0, 0, 0}, 0.5);
-    add(forced, x, v, {4 * v[1] + 12 * x[0], -4 * v[0], -9 * x[2]}, 0.5);
+    add(forced, x, v, {2 * omega * v[1] + 3 * omega * omega * x[0], -2 * omega * v[0], -9 * x[2]}, 0.5);
     CHECK_THAT(stepFromMotion(inFrame, 0.0, wide, true, patch),
                WithinRel(stepFromMotion(forced, 0.0, wide, true), 1e-14));
     Bodies<double> beside = inFrame;  // something that is held is there

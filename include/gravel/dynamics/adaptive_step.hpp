@@ -114,7 +114,7 @@ Scalar stepFromMotion(const Bodies<Scalar, Layout>& bodies, const Scalar& soften
     const Scalar r = body.radius();
     const Scalar l = std::max<Scalar>(r, floor);
     Vector3<Scalar> pull = body.acceleration() - a_cm;
-    if (frame.turns() && flow.domain.isOpen()) {
+    if (frame.turns() && anchored) {
       pull += frame.acceleration(body.position(), body.velocity());
     }
     const Scalar a = pull.norm();
