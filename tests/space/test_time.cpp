@@ -115,6 +115,84 @@ TEST_CASE("Adaptive steps shorten for a fast approach, keep to their limits, and
   CHECK_THAT(slow.getPreviousTimeStep(), WithinRel(0.025, 1e-12));  // a quarter of a radius at 5 m/s
 }
 
+// Seen to fail: with mutual gravity, however weak, fixed bodies forgotten: steps of 0.04 to 0.5 s, in which
+// balls went 0.2 radii into the floor.
+TEST_CASE("Adaptive steps see a field press on a floor of fixed balls, with mutual gravity and without") {
+  for (const double G : {0.0, SimulationConfig<double>{}.G}) {
+    SimulationConfig<double> config;
+    config.G = G;
+    config.timeStep = 0.5;
+    config.coeffRestitution = 0.3;
+    Space<double> space(config);
+    space.setUniformField({0, 0, -9.81});
+    for (int i = 0; i < 49; ++i) {
+      Body<double> grain = at({i % 7 - 3.0, i / 7 - 3.0, 0}, {0, 0, 0});
+      grain.fixed = true;
+      space.addBody(grain);
+    }
+    for (int i = 0; i < 18; ++i) {
+      const int k = i / 9;
+      space.addBody(
+          at({1.01 * (i % 3 - 1) + 0.003 * k, 1.01 * (i / 3 % 3 - 1) + 0.002 * (i % 3 - 1), 1.2 + 1.05 * k},
+             {0, 0, 0}));
+    }
+    double longest = 0;
+    double deepest = 0;
+    while (space.time() < 3) {
+      space.computeDynamics(space.steps());
+      longest = std::max(longest, space.getPreviousTimeStep());
+      for (const Contact<double>& c : space.contacts()) {
+        deepest = std::max(deepest, -c.gap);
+      }
+    }
+    CAPTURE(G);
+    CHECK(longest < 0.01);
+    CHECK(deepest < 1e-3 * 0.5);
+  }
+}
+
+// Seen to fail: a first step of the longest, in which the ball fell 0.66 of its radius into the fixed one.
+TEST_CASE("Adaptive steps see a frame press on a fixed ball, with mutual gravity and without") {
+  for (const double G : {0.0, 1e-30}) {
+    for (const double omega : {0.0, 1e-6}) {
+      SimulationConfig<double> config;
+      config.G = G;
+      config.timeStep = 1;
+      config.integrator = IntegratorKind::SymplecticEpicycle;
+      config.coeffRestitution = 0;
+      config.contactSubsteps = 1;
+      Space<double> space(config);
+      space.setDomain(Domain<double>::shearPeriodic({1000, 1000, 1000}, omega, 1.0));
+      Body<double> rock = at({0, 0, 10}, {0, 0, 0}, 1);
+      rock.fixed = true;
+      space.addBody(rock);
+      space.addBody(at({0, 0, 12}, {0, 0, 0}, 1));
+      CAPTURE(G, omega);
+      for (std::size_t i = 0; i < 20; ++i) {
+        space.computeDynamics(i);
+        CHECK_THAT(space.getPreviousTimeStep(), WithinRel(0.02 / std::sqrt(12.0), 1e-3));
+      }
+      CHECK_THAT(space.body(1).position()[2], WithinAbs(12.0, 1e-3));
+    }
+  }
+}
+
+// Where nothing else presses them a fixed sun asks nothing more of planets, whatever their radii.
+TEST_CASE("About a fixed sun a circular orbit has its 314 steps, and planets their true radii") {
+  SimulationConfig<double> config;
+  config.G = 1;
+  config.timeStep = 10;
+  Space<double> space(config);
+  Body<double> sun = at({0, 0, 0}, {0, 0, 0}, 1e-2);
+  sun.fixed = true;
+  space.addBody(sun);
+  Body<double> planet = at({1, 0, 0}, {0, 1, 0}, 1e-4);
+  planet.mass = 1e-9;
+  space.addBody(planet);
+  space.computeDynamics(0);
+  CHECK_THAT(2 * pi<double>() / space.getPreviousTimeStep(), WithinRel(314.16, 1e-3));
+}
+
 // Seen to fail: the next step as long as the longest.
 TEST_CASE("A new longest step between adaptive ones limits the next, and does not lengthen it") {
   SimulationConfig<double> config;

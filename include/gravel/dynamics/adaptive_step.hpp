@@ -14,7 +14,7 @@
 /// at (3/2) |Omega| (r_i + r_j) by the flow, so that of the largest r is added to their speeds. Where
 /// something stands still in such a frame, a counts what that adds, which presses on it: by the forces alone
 /// a ball that the tide holds on a floor took steps of half an orbit. The rule for bodies under forces whose
-/// law is not known; under mutual gravity see encounter_step.hpp.
+/// law is not known, or that something holds up; under mutual gravity see encounter_step.hpp.
 
 #include <gravel/bodies/bodies.hpp>
 #include <gravel/core/check.hpp>

@@ -228,8 +228,17 @@ void Space<Scalar, Layout>::updateAdaptiveTimeStep() {
                                   Scalar(static_cast<double>(mostContactSteps(c.contactSubsteps)))};
   Scalar wanted = limits.largest;
   const bool pulls = !(getG() == Scalar(0)) && n() > 1;
-  // Something at rest outside, or a force whose law is not known, counts by the motion of single bodies.
-  if (!pulls || force_.hook || !contact_.boundaries.empty()) {
+  // A plane, a fixed body on which more than their own gravity presses others, or a force whose law is not
+  // known, counts by the motion of single bodies.
+  const auto holdsUp = [&] {
+    const bool pressed = !(force_.field == Vector::Zero()) || HillFrame<Scalar>(contact_.domain).turns();
+    std::size_t i = 0;
+    while (pressed && i < n() && !bodies_[i].isFixed()) {
+      ++i;
+    }
+    return pressed && i < n();
+  };
+  if (!pulls || force_.hook || !contact_.boundaries.empty() || holdsUp()) {
     wanted = stepFromMotion(bodies_, c.softening, limits, !contact_.boundaries.empty(), contact_.domain);
   }
   if (pulls) {
