@@ -87,8 +87,10 @@ std::size_t Space<Scalar, Layout>::chooseParts(const Scalar& h) {
   }
   const HillFrame<Scalar> frame(contact_.domain);
   const auto accelerationOf = [&](std::uint32_t i) {
-    return Vector(bodies_.accelerations()[i] +
-                  frame.acceleration(bodies_.positions()[i], bodies_.velocities()[i]));
+    return detail::isMovable(bodies_, i)
+               ? Vector(bodies_.accelerations()[i] +
+                        frame.acceleration(bodies_.positions()[i], bodies_.velocities()[i]))
+               : Vector(Vector::Zero());
   };
   Scalar rate_sq(0);
   for (const Contact<Scalar>& c : contacts()) {
