@@ -131,7 +131,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
   }
 
   void clear() {
-    if (!std::exchange(this->cleared_, true)) {  // by the second time it would seem that nothing was filled
+    if (!this->cleared_) {  // by the second time it would seem that nothing was filled
       Base::forget();
       detail::clearSpare(turns_);
       late_.clear();

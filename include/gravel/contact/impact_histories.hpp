@@ -19,33 +19,36 @@ class ImpactHistories {
   /// For so many bodies. O(N) where they are others than before.
   void resize(std::size_t count) { place_.resize(count, none); }
 
-  /// Nothing has happened.
+  /// Nothing has happened. Asks for no memory.
   void forget() {
     for (const std::uint32_t body : struck_) {
       place_[body] = none;
     }
     struck_.clear();
     clearSpare(all_);
-    all_.resize(1);
   }
 
-  const History& of(std::uint32_t body) const { return all_[body < place_.size() ? place_[body] : none]; }
+  const History& of(std::uint32_t body) const {
+    const std::uint32_t place = body < place_.size() ? place_[body] : none;
+    return place == none ? quiet_ : all_[place - 1];
+  }
 
   /// To be changed.
   History& at(std::uint32_t body) {
     if (place_[body] == none) {
       struck_.push_back(body);  // first, so that forget() finds it whatever happens
       all_.emplace_back();
-      place_[body] = static_cast<std::uint32_t>(all_.size() - 1);
+      place_[body] = static_cast<std::uint32_t>(all_.size());
     }
-    return all_[place_[body]];
+    return all_[place_[body] - 1];
   }
 
  private:
   static constexpr std::uint32_t none = 0;
 
-  std::vector<std::uint32_t> place_;                    ///< by body: in all_
-  std::vector<History> all_ = std::vector<History>(1);  ///< the first one is that of all others
+  std::vector<std::uint32_t> place_;  ///< by body: in all_, counted from 1
+  std::vector<History> all_;
+  History quiet_;  ///< of all others
   std::vector<std::uint32_t> struck_;
 };
 

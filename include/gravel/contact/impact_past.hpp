@@ -29,6 +29,7 @@ class ImpactPast {
     clearSpare(impacts_);
     clearSpare(earlier_);
     merges_.clear();
+    cleared_ = true;
   }
   /// All blows of the step are dealt: what nobody else looks at.
   void end() {
