@@ -39,6 +39,10 @@ class NarrowPhase {
       detail::refuse("length of what carries bodies", std::to_string(settings.carried.size()),
                      "0, or the number of bodies, " + std::to_string(bodies.size()));
     }
+    if (!settings.bend.empty() && settings.bend.size() != bodies.size()) {
+      detail::refuse("length of what frames add", std::to_string(settings.bend.size()),
+                     "0, or the number of bodies, " + std::to_string(bodies.size()));
+    }
     walls_.find(bodies, materials, boundaries, settings, nearBoundaries);
     if (!pairs.empty()) {
       spheres_.resize(bodies.size());
