@@ -69,6 +69,10 @@ class Epicycle {
     detail::require("turn of the frame in a step [rad]", fastestTurn(frame, h),
                     {Scalar(0), Scalar(1e6), "at most 1e6"});
   }
+  /// Whether check() lets h [s] pass.
+  static bool takes(const HillFrame<Scalar>& frame, const Scalar& h) {
+    return fastestTurn(frame, h) <= Scalar(1e6);
+  }
 
   /// \param dx,dv what is to be added to x and v
   void increments(const Vector3<Scalar>& x, const Vector3<Scalar>& v, Vector3<Scalar>& dx,

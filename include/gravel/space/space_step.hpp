@@ -129,7 +129,8 @@ void Space<Scalar, Layout>::check(const Scalar& h) const {
   orbits_.check(this->config_.integrator, bodies_, contact_, force_);
   const HillFrame<Scalar> frame(contact_.domain);
   // One that is yet to be chosen is looked at when it is.
-  if (frame.turns() && (!this->config_.adaptiveTimeStep || (forcesValid_ && !placesChanged()))) {
+  if (frame.turns() && !Epicycle<Scalar>::takes(frame, h) &&
+      (!this->config_.adaptiveTimeStep || (forcesValid_ && !placesChanged()))) {
     Epicycle<Scalar>::check(frame, h);
   }
 }
