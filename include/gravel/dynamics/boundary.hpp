@@ -123,6 +123,9 @@ class Boundaries {
   /// Planes of this number and above have been through no step yet.
   std::size_t firstNew() const { return firstNew_; }
 
+  /// For so many more planes.
+  void makeRoom(std::size_t more) { planes_.reserve(planes_.size() + more); }
+
   /// \return the plane's number
   std::size_t add(Plane<Scalar> plane) {
     plane.number = next_;

@@ -106,12 +106,14 @@ std::vector<std::size_t> Space<Scalar, Layout>::addBox(const Vector& low, const 
   this->inStep_.refuse("addBox()");
   contact_.materials.check(static_cast<std::uint32_t>(material), "the new box");
   const auto faces = makeBox(low, high, material, open);
-  wakeAll();
-  forcesValid_ = false;
   std::vector<std::size_t> numbers;
+  numbers.reserve(faces.size());
+  contact_.boundaries.makeRoom(faces.size());  // nothing asks for memory from here on
   for (const Plane<Scalar>& face : faces) {
     numbers.push_back(contact_.boundaries.add(face));
   }
+  wakeAll();
+  forcesValid_ = false;
   return numbers;
 }
 
