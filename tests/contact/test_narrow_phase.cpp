@@ -164,20 +164,24 @@ TEST_CASE("what carries bodies, or bends their ways, is by body, and the list st
   const std::vector<double> carried(bodies.size());
   ContactList<double> contacts;
   NarrowPhase<double> narrow;
-  const auto find = [&](std::size_t carries, std::size_t bends) {
+  const std::vector<std::uint8_t> leaning(bodies.size());
+  const auto find = [&](std::size_t carries, std::size_t bends, std::size_t leans) {
     NarrowPhaseSettings<double> settings;
     settings.step = 1e-3;
     settings.carried = std::span(carried).first(carries);
     settings.bend = std::span(bend).first(bends);
+    settings.leaning = std::span(leaning).first(leans);
     narrow.find(allPairs(bodies), bodies, Domain<double>::open(), materials, floor, settings, contacts);
   };
-  find(3, 3);
-  find(0, 0);
+  find(3, 3, 3);
+  find(0, 0, 0);
   REQUIRE(contacts.size() == 3);
-  CHECK_THROWS_WITH(find(2, 3), ContainsSubstring("length of what carries bodies is 2; allowed: 0, or the "
-                                                  "number of bodies, 3"));
-  CHECK_THROWS_WITH(find(3, 1), ContainsSubstring("length of what frames add is 1; allowed: 0, or the "
-                                                  "number of bodies, 3"));
+  CHECK_THROWS_WITH(find(2, 3, 3), ContainsSubstring("length of what carries bodies is 2; allowed: 0, or the "
+                                                     "number of bodies, 3"));
+  CHECK_THROWS_WITH(find(3, 1, 0), ContainsSubstring("length of what frames add is 1; allowed: 0, or the "
+                                                     "number of bodies, 3"));
+  CHECK_THROWS_WITH(find(0, 3, 2), ContainsSubstring("length of who leans is 2; allowed: 0, or the number "
+                                                     "of bodies, 3"));
   CHECK(contacts.size() == 3);
 }
 

@@ -35,14 +35,15 @@ class NarrowPhase {
             std::optional<std::span<const std::uint32_t>> nearBoundaries = std::nullopt) {
     detail::requireWhole(bodies);
     validate(settings);
-    if (!settings.carried.empty() && settings.carried.size() != bodies.size()) {
-      detail::refuse("length of what carries bodies", std::to_string(settings.carried.size()),
-                     "0, or the number of bodies, " + std::to_string(bodies.size()));
-    }
-    if (!settings.bend.empty() && settings.bend.size() != bodies.size()) {
-      detail::refuse("length of what frames add", std::to_string(settings.bend.size()),
-                     "0, or the number of bodies, " + std::to_string(bodies.size()));
-    }
+    const auto requireByBody = [&](const char* what, std::size_t length) {
+      if (length != 0 && length != bodies.size()) {
+        detail::refuse(what, std::to_string(length),
+                       "0, or the number of bodies, " + std::to_string(bodies.size()));
+      }
+    };
+    requireByBody("length of what carries bodies", settings.carried.size());
+    requireByBody("length of what frames add", settings.bend.size());
+    requireByBody("length of who leans", settings.leaning.size());
     walls_.find(bodies, materials, boundaries, settings, nearBoundaries);
     if (!pairs.empty()) {
       spheres_.resize(bodies.size());
