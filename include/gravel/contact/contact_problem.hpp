@@ -23,7 +23,6 @@ class ContactProblem : public detail::ProblemBodies<S> {
   using Base::accelerationOf;
   using Base::chunk;
   using Base::gatherBodies;
-  using Base::restart;
   using Base::sameScales_;
   using Base::speedExponent_;
 
@@ -39,6 +38,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
   using Base::friction;
   using Base::impulseIn;
   using Base::initial;
+  using Base::restart;
   using Base::speedIn;
   using Base::watch;
 

@@ -68,6 +68,7 @@ class IslandSweeps : private RowImpulses<S> {
         }
       }
       if (accelerate && left_ > 0) {
+        leap();
         if (first) {
           findSlots();
           momentum_.begin(problem_, begin_, end_, slots_);
@@ -247,6 +248,44 @@ class IslandSweeps : private RowImpulses<S> {
       island.course.begin(island.now, island.more);
     } else {
       island.course.goOn(island.now, island.more);
+    }
+  }
+
+  /// On along the last steps, within the limits of impulses; bodies as these make them.
+  void leap() {
+    const auto leaps = [](const Island& island) { return !island.ended && island.course.leap() > S(0); };
+    if (std::none_of(islands_.begin(), islands_.end(), leaps)) {
+      return;
+    }
+    for (std::size_t i = 0; i < slots_.size(); ++i) {
+      if (leaps(islands_[islandOfSlot_[i]])) {
+        problem_.restart(slots_[i]);
+      }
+    }
+    for (const ContactColoring::Part& colour : colours_) {
+      const auto wanted = [&](std::size_t k) { return leaps(islandOf(k)); };
+      forGroupsOf<S>(colouring_, colour.begin, colour.end, wanted, [&](const Group& group) {
+        auto row = problem_.load(group, true);
+        auto b1 = BodyLanes<S>::load(problem_.bodies, group.slot1);
+        auto b2 = BodyLanes<S>::load(problem_.bodies, group.slot2);
+        const auto step =
+            Pack::of([&](std::size_t lane) { return islandOf(group.row[lane]).course.leap(); }) *
+            momentum_.load(group);
+        row.jn = largerOf(row.jn + step.n, Pack::zero());
+        row.jt = row.jt + step.t;
+        row.l = row.l + step.l;
+        cutToCone(row, b1, b2);
+        push(b1, b2, row.wholeImpulse());
+        twist(row, b1, b2, row.jt);
+        if (!problem_.turning.empty()) {
+          const auto turning = TurningLanes<S>::load(problem_.turning, group);
+          row.l = turning.within(row, row.l);
+          turn(b1, b2, turning.by(row.l, b1, b2));
+        }
+        b1.store(problem_.bodies, group.slot1, problem_.friction);
+        b2.store(problem_.bodies, group.slot2, problem_.friction);
+        problem_.storeImpulses(group, row);
+      });
     }
   }
 

@@ -63,6 +63,14 @@ class ProblemBodies {
     return scaledLanes(j, speedExponent_ + massExponent_);
   }
 
+  /// Takes back what impulses did to a body.
+  void restart(std::uint32_t slot) {
+    if (bodies[slot].inverseMass > S(0)) {  // immovable bodies are shared between threads: never written
+      bodies[slot].v = initial[slot].v;
+      bodies[slot].s = initial[slot].s;
+    }
+  }
+
  protected:
   static constexpr std::size_t chunk = 512;
   using Scales = ProblemScales<S>;
@@ -189,14 +197,6 @@ class ProblemBodies {
     if (b.inverseMass > S(0)) {
       b.inverseMass = S(1) / scaled<S>(b.inverseMass, massExponent_);
       b.spin *= b.inverseMass;
-    }
-  }
-
-  /// Takes back what the guess did to a body.
-  void restart(std::uint32_t slot) {
-    if (bodies[slot].inverseMass > S(0)) {  // immovable bodies are shared between threads: never written
-      bodies[slot].v = initial[slot].v;
-      bodies[slot].s = initial[slot].s;
     }
   }
 

@@ -65,11 +65,21 @@ class SweepCourse {
   void begin(const SweepProgress<S>& now, bool more) { before_ = more ? S(0) : now.size; }
   /// Another one with a share.
   void goOn(const SweepProgress<S>& now, bool more) {
-    const S next = more ? S(0) : shareAfter(now);
+    const int phase = sweeps_ % patience;
+    const bool probes = mayLeap_ && phase + 2 >= patience;  // the next one is bare
+    leap_ = S(0);
+    if (mayLeap_ && phase == 0 && !more && bare_ && share_ == S(0)) {
+      leap_ = change_ < changeAtLeap_ / S(2) ? leapAfter(now) : S(0);  // what is left may be rounding
+      mayLeap_ = leap_ > S(0);
+      changeAtLeap_ = change_;
+    }
+    const S next = more || probes || leap_ > S(0) ? S(0) : shareAfter(now);
     bare_ = !more && share_ == S(0);
     share_ = next;
     before_ = more ? S(0) : now.size;
   }
+  /// Before the next sweep impulses are to go on by as many of their last steps; mostly 0.
+  const S& leap() const { return leap_; }
 
  private:
   S shareAfter(const SweepProgress<S>& now) const {
@@ -83,6 +93,18 @@ class SweepCourse {
     return now.size < S(1.001) * before_ ? std::min<S>(S(1), now.size / before_) : S(0);
   }
 
+  /// Sweeps, of which the last two are bare, to see whether all that is left goes one way.
+  static constexpr int patience = 128;
+
+  /// A light body between heavy ones makes each step the same share q of the one before, 1 - 2 m/M say; what
+  /// is left is the sum of a geometric series, q + q^2 + ... = q/(1 - q) of the last step, for which momentum
+  /// takes sqrt(M/m) sweeps.
+  S leapAfter(const SweepProgress<S>& now) const {
+    const bool oneWay = now.along * now.along > S(1 - 1e-6) * (now.size * before_);
+    const S left = before_ - now.along;
+    return oneWay && now.along > S(0) && left > S(0) ? S(now.along / left) : S(0);
+  }
+
   S enough_;
   int most_;
   int sweeps_ = 0;
@@ -90,6 +112,9 @@ class SweepCourse {
   S share_ = S(0);
   S before_ = S(0);    ///< square of the changes of the last sweep
   bool bare_ = false;  ///< that one had no share
+  S leap_ = S(0);
+  bool mayLeap_ = true;
+  S changeAtLeap_ = Eigen::NumTraits<S>::highest();  ///< at the last one
 };
 
 }  // namespace gravel::detail
