@@ -247,3 +247,69 @@ TEST_CASE("What a force hook presses to the floor takes no work and loses nothin
   CHECK_THAT(ledger.friction, WithinAbs(0, jump));
   CHECK_THAT(ledger.total(), WithinAbs(0, jump));
 }
+
+// Two that fall back on each other as they turn, and what pulls them turns meanwhile. Seen to fail: the slip
+// left as the acceleration of the step's start has it (they gain 2.1e-4 J in the mean; now 0.4e-4, of ten
+// times as many runs half as long 0.8e-6 +- 3.4e-6), and an impulse that is told without (off by 1.7e-5 of
+// it).
+TEST_CASE("Rough elastic spheres bounce under their own gravity without a drift of energy") {
+  const double h = 0.02;
+  const int runs = 40;
+  double mean = 0;
+  double off = 0;
+  std::size_t blows = 0;
+  for (int k = 0; k < runs; ++k) {
+    SimulationConfig<double> config = plain(h);
+    config.G = 1.0;
+    config.coeffRestitution = config.tangentialRestitution = 1.0;
+    config.coeffFriction = config.coeffStaticFriction = 1e3;
+    Space<double> space(config);
+    const double x = 0.007 * k;
+    space.addBody(ball({-1, 0, 0}, {0, 0.2 + x / 3, 0.1}, 0.5, 0.5, {0.3, 0.1 + x, 0.5}));
+    space.addBody(ball({1 + x, 0, 0}, {0, -0.2, -0.1}, 0.5, 0.5, {-0.2, 0.4, 0.1 + x}));
+    const ConservedQuantities<double> before = space.conserved();
+    const double start = space.energyLedger().total();
+    while (space.time() < 400) {
+      const Vec v = space.body(1).velocity();
+      const Vec a = space.body(1).acceleration();
+      space.computeDynamics(0);
+      for (const Impact<double>& blow : space.impacts()) {
+        ++blows;
+        if (space.impacts().size() == 1) {
+          const Vec told = blow.impulse.normal * blow.normal + blow.impulse.tangential;
+          const Vec kicks = (a + Vec(space.body(1).acceleration())) * (h / 2);
+          const Vec dealt = 0.5 * (Vec(space.body(1).velocity()) - v - kicks);
+          off += (told - dealt).norm() / dealt.norm();
+        }
+      }
+    }
+    mean += (space.energyLedger().total() - start) / runs;
+    CHECK((space.conserved().momentum - before.momentum).norm() < 1e-13);
+    CHECK((space.conserved().angularMomentum - before.angularMomentum).norm() < 1e-13);
+    CHECK_THAT(space.energyLedger().friction, WithinAbs(0.0, 1e-12));
+  }
+  CAPTURE(blows, mean, off);
+  CHECK(blows > 2000);
+  CHECK(std::abs(mean) < 7e-5);
+  CHECK(off / static_cast<double>(blows) < 2e-6);
+}
+
+// Head-on, in a step in which something begins to push them aside. Seen to fail: no slip counted as one that
+// friction of coefficient 0 turns back.
+TEST_CASE("What nothing rubs gets no spin from a blow, whatever its tangential restitution") {
+  SimulationConfig<double> config = plain(0.02);
+  config.coeffRestitution = config.tangentialRestitution = 1.0;
+  Space<double> space(config);
+  space.addBody(ball({-0.505, 0, 0}, {1, 0, 0}, 0.5));
+  space.addBody(ball({0.505, 0, 0}, {-1, 0, 0}, 0.5));
+  space.setForceHook([](auto& bodies, double time) {
+    if (time > 0) {
+      bodies[0].force() += Vec(0, 1, 0);
+    }
+  });
+  space.computeDynamics(0);
+  CHECK(space.impacts().size() == 1);
+  CHECK(space.body(0).velocity()[1] > 0);
+  CHECK(space.body(0).angularVelocity() == Vec::Zero());
+  CHECK(space.body(1).angularVelocity() == Vec::Zero());
+}

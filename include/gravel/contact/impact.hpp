@@ -52,6 +52,7 @@ struct Impact {
   Scalar settle;  ///< [s] since the start of the step: when the last of its bounces is over, if it rests
   bool decided = false;        ///< by somebody else's outcome
   Scalar parting = Scalar(0);  ///< [m s^-1] along the normal, of what was decided; 0 of what shall merge
+  Scalar fling = Scalar(0);    ///< tangential restitution, of a slip that it turned back; else 0
 
   ContactKeys keys() const { return {key1, key2}; }
 };

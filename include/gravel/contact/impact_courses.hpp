@@ -129,7 +129,8 @@ class ImpactCourses : protected ImpactForecast<S> {
     Vector3<S> l = Vector3<S>::Zero();     ///< angular impulse over the effective radius
     S q1 = S(0);                           ///< effective radius / radius
     S q2 = S(0);
-    S work = S(0);  ///< of both, less that of dv_t on what supports bodies
+    S work = S(0);   ///< of both, less that of dv_t on what supports bodies
+    S fling = S(0);  ///< restitution of a slip that sticks
   };
 
   /// \param slip [m s^-1] across n \param dv_n [m s^-1] of the blow, along the normal
@@ -151,6 +152,8 @@ class ImpactCourses : protected ImpactForecast<S> {
                                         restitution);
     grip.dv_t = j;
     grip.l = l;
+    const bool sticks = (S(1) + restitution) * safeNorm(slip) < material.staticFriction * dv_n * m.slip;
+    grip.fling = sticks ? restitution : S(0);
     const Vector3<S> rhoRubbed = rho + m.both * n.cross(j);
     grip.work = j.dot(Vector3<S>(slip + (m.slip / S(2)) * j - (two.supported - one.supported))) +
                 l.dot(Vector3<S>(rhoRubbed + (m.turn / S(2)) * l));

@@ -219,8 +219,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
       }
       outcome = Base::asOne(scene, event, at, v_rel);
     }
-    // Two that part may be driven together again in this step. Those that do not would meet for ever: they
-    // are left to the solver of contacts at its end.
+    // Two that part may be driven together again in this step; others, for ever: the end's solve has them.
     const Vector3<S> v1 = one.movable ? outcome.velocity1 : one.v;
     const Vector3<S> v2 = two.movable ? outcome.velocity2 : two.v;
     const S parting = n.dot(Vector3<S>(v2 - v1 + drift));
@@ -281,7 +280,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     const MassShares<S> share = massShares<S>(one.mass, one.movable, two.mass, two.movable);
     const S dv_n = target - v_n;
     const Vector3<S> slip = v_rel - v_n * n - Vector3<S>(one.c * one.s + two.c * two.s).cross(n);
-    const auto [dv_t, l, q1, q2, gripWork] =
+    const auto [dv_t, l, q1, q2, gripWork, fling] =
         Base::gripOf(*at, boundary, share, slip, dv_n, bounces ? material.tangentialRestitution : S(0));
     // In two strokes, stop and rebound: a head-on blow then ends at exactly e times its speed.
     const std::array<Vector3<S>, 3> strokes{S(-v_n) * n, target * n, dv_t};
@@ -312,6 +311,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
                         {m * dv_n, m * dv_t, m * l, true},
                         rests || !(target > fall),
                         ends && e < S(1) ? S(t + S(2) * e * speed / ((S(1) - e) * pull)) : t});
+    impacts_.back().fling = fling;
     remember(scene, e, report);
     return true;
   }

@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <span>
-#include <utility>
 #include <vector>
 
 namespace gravel {
@@ -27,12 +26,20 @@ namespace gravel {
 /// they meet at the speed that the mean of a_0 and of a_1, which is that at the place of the blow, gives by
 /// then, so that u lacks
 ///     du = -n.(a_1 - a_0) t/2,
-/// and loses all of it. Blows after which a pair is pressed together, and friction, are left as they are; and
-/// so is a pair that has turned by more than 60 degrees since. In a uniform field a_1 = a_0, and nothing
-/// changes.
+/// and loses all of it. A slip that friction turned back, b times as fast, lacks (a_1 - a_0)_t (t - h/2)/2 in
+/// the same way, and friction -(1 + b) m_t times that, as at the arms of that moment. Blows after which a
+/// pair is pressed together, other friction, and what resists turning are left as they are; and so is a pair
+/// that has turned by more than 60 degrees since. In a uniform field a_1 = a_0, and nothing changes.
 template <Real S>
 class LateBlows {
  public:
+  /// What makeUp() adds to losses, and the work that forces without a potential did thereby [J].
+  struct Made {
+    S restitutionLoss = S(0);
+    S frictionLoss = S(0);
+    S work = S(0);
+  };
+
   void clear() { blows_.clear(); }
 
   /// Takes up blows of a drift that is still to come. \param bodies with the accelerations a_0
@@ -40,11 +47,11 @@ class LateBlows {
   template <ContactBodies B>
   void take(std::span<const Impact<S>> impacts, const B& bodies, const S& start, std::size_t place) {
     for (const Impact<S>& impact : impacts) {
-      const S apart = pull(bodies, impact);
-      const bool stays = impact.rests && !(apart > S(0));
+      const Vector3<S> pulled = pull(bodies, impact);
+      const bool stays = impact.rests && !(impact.normal.dot(pulled) > S(0));
       if (!stays && !(impact.decided && impact.rests) && impact.speed > S(0)) {
-        blows_.push_back({impact.first, impact.second, place, impact.normal, apart, S(start + impact.time),
-                          impact.speed, impact.decided, impact.parting});
+        blows_.push_back({impact.first, impact.second, place, impact.normal, pulled, S(start + impact.time),
+                          impact.speed, impact.decided, impact.parting, impact.fling});
       }
       ++place;
     }
@@ -54,24 +61,27 @@ class LateBlows {
   /// \param time [s] of that, for a sheared domain  \param h [s] from a_0 to a_1
   /// \param impulseOf  the impulse of the blow of a place
   /// \param change  of a body, the part of a_1 - a_0 of forces without a potential [m s^-2]
-  /// \return loss to restitution, and the work that such forces did thereby [J]
   template <ContactBodies B, class ImpulseOf, class Change>
-  std::pair<S, S> makeUp(B& bodies, const Domain<S>& domain, const S& time, const S& h, ImpulseOf&& impulseOf,
-                         Change&& change) {
-    S loss(0);
-    S work(0);
+  Made makeUp(B& bodies, const Domain<S>& domain, const S& time, const S& h, ImpulseOf&& impulseOf,
+              Change&& change) {
+    Made made;
     for (const Blow& blow : blows_) {
       const bool sticks = blow.decided && blow.parting == S(0);
       const S since = sticks ? blow.time : S(blow.time - h / S(2));
-      const S du = (blow.pull - pull(bodies, blow)) * since / S(2);
-      if (du == S(0)) {
+      const Vector3<S> lack = (pull(bodies, blow) - blow.pull) * (since / S(2));
+      if (lack == Vector3<S>::Zero()) {
         continue;
       }
+      const S du = -blow.normal.dot(lack);
       const bool boundary = blow.second == staticPartner;
       Vector3<S> n = blow.normal;
+      S distance = bodies.radii()[blow.first];
+      S reach = distance;
       if (!boundary) {
         n = domain.minimumImage(
             Vector3<S>(Vector3<S>(bodies.positions()[blow.second]) - bodies.positions()[blow.first]), time);
+        distance = detail::safeNorm(n);
+        reach += bodies.radii()[blow.second];
         n = detail::safeUnit(n);
       }
       const MassShares<S> share =
@@ -81,29 +91,43 @@ class LateBlows {
       if (!(S(2) * n.dot(blow.normal) > S(1)) || !(share.effective > S(0))) {
         continue;
       }
-      S& jn = impulseOf(blow.place).normal;
-      const S parting = blow.decided ? blow.parting : S(jn / share.effective - blow.speed);
+      ContactImpulse<S>& impulse = impulseOf(blow.place);
+      const S parting = blow.decided ? blow.parting : S(impulse.normal / share.effective - blow.speed);
       const S kept = std::min<S>(parting / blow.speed, S(1));
-      const S dv = sticks ? S(0) : S((S(1) + kept) * du);
+      Vector3<S> dv = (sticks ? S(0) : S((S(1) + kept) * du)) * n;
+      // Motion and loss have J du more, of which a part is no potential's.
+      Vector3<S> blows = (share.effective * (blow.speed + parting)) * blow.normal;
+      made.restitutionLoss += share.effective * (blow.speed - kept * parting) * du;
+      if (blow.fling > S(0)) {
+        const S c = distance / reach;
+        const S spin1 = spinOf(bodies, blow.first, share.first);
+        const S spin2 = boundary ? S(0) : spinOf(bodies, blow.second, share.second);
+        const Vector3<S> slip = lack - n.dot(lack) * n;
+        const Vector3<S> dv_t = slip * -((S(1) + blow.fling) / (S(1) + c * c * (spin1 + spin2)));
+        made.frictionLoss -= (S(1) - blow.fling) * impulse.tangential.dot(slip);
+        blows += impulse.tangential;
+        impulse.tangential += share.effective * dv_t;
+        const Vector3<S> turn = c * n.cross(dv_t);
+        twist(bodies, blow.first, spin1, turn);
+        twist(bodies, blow.second, spin2, turn);
+        dv += dv_t;
+      }
+      Vector3<S> others = Vector3<S>::Zero();
       if (share.first > S(0)) {
-        bodies.velocities()[blow.first] -= Vector3<S>((share.first * dv) * n);
+        bodies.velocities()[blow.first] -= Vector3<S>(share.first * dv);
+        others -= Vector3<S>(change(blow.first));
       }
       if (share.second > S(0)) {
-        bodies.velocities()[blow.second] += Vector3<S>((share.second * dv) * n);
+        bodies.velocities()[blow.second] += Vector3<S>(share.second * dv);
+        others += Vector3<S>(change(blow.second));
       }
       if (!blow.decided) {
-        jn += share.effective * dv;
+        impulse.normal += share.effective * n.dot(dv);
       }
-      loss += share.effective * (blow.speed - kept * parting) * du;
-      // Motion and loss have J du more, of which that much is no potential's.
-      S along = share.second > S(0) ? S(-n.dot(Vector3<S>(change(blow.second)))) : S(0);
-      if (share.first > S(0)) {
-        along += n.dot(Vector3<S>(change(blow.first)));
-      }
-      work += share.effective * (blow.speed + parting) * along * since / S(2);
+      made.work -= blows.dot(others) * since / S(2);
     }
     blows_.clear();
-    return {loss, work};
+    return made;
   }
 
  private:
@@ -112,23 +136,38 @@ class LateBlows {
     std::uint32_t second;
     std::size_t place;
     Vector3<S> normal;
-    S pull;  ///< [m s^-2] n.(a_2 - a_1) of the two bodies
-    S time;  ///< [s]
+    Vector3<S> pull;  ///< [m s^-2] a_2 - a_1 of the two bodies
+    S time;           ///< [s]
     S speed;
     bool decided;  ///< by somebody else, who gave
     S parting;     ///< [m s^-1] along the normal, 0 to two that shall merge
+    S fling;       ///< of a slip that was turned back, the share
   };
 
   template <class B, class Pair>
-  static S pull(const B& bodies, const Pair& pair) {
-    S along(0);
+  static Vector3<S> pull(const B& bodies, const Pair& pair) {
+    Vector3<S> relative = Vector3<S>::Zero();
     if (pair.second != staticPartner && detail::isMovable(bodies, pair.second)) {
-      along += pair.normal.dot(Vector3<S>(bodies.accelerations()[pair.second]));
+      relative += Vector3<S>(bodies.accelerations()[pair.second]);
     }
     if (detail::isMovable(bodies, pair.first)) {
-      along -= pair.normal.dot(Vector3<S>(bodies.accelerations()[pair.first]));
+      relative -= Vector3<S>(bodies.accelerations()[pair.first]);
     }
-    return along;
+    return relative;
+  }
+
+  /// Share of a change of velocity over k in k m r^2; 0 of what cannot turn.
+  template <class B>
+  static S spinOf(const B& bodies, std::uint32_t i, const S& share) {
+    const S k = bodies.inertiaFactors()[i];
+    return k > S(0) && S(bodies.radii()[i]) > S(0) ? S(share / k) : S(0);
+  }
+
+  template <class B>
+  static void twist(B& bodies, std::uint32_t i, const S& spin, const Vector3<S>& turn) {
+    if (spin > S(0)) {
+      bodies.angularVelocities()[i] -= Vector3<S>(turn * (spin / S(bodies.radii()[i])));
+    }
   }
 
   std::vector<Blow> blows_;

@@ -204,9 +204,10 @@ Scalar ContactStage<Scalar, Layout>::makeUpBlows(Bodies& bodies, const Scalar& t
   const auto impulseOf = [&](std::size_t k) -> ContactImpulse<Scalar>& {
     return k < before ? record_.impacts()[k].impulse : impacts_.impacts()[k - before].impulse;
   };
-  const auto [loss, work] = late_.makeUp(bodies, domain, time, h, impulseOf, change);
-  report_.restitutionLoss += loss;
-  return work;
+  const auto made = late_.makeUp(bodies, domain, time, h, impulseOf, change);
+  report_.restitutionLoss += made.restitutionLoss;
+  report_.frictionLoss += made.frictionLoss;
+  return made.work;
 }
 
 template <Real Scalar, class Layout>
