@@ -509,6 +509,81 @@ TEST_CASE(
   }
 }
 
+// Seen to fail: what a step brings counted as rest for those that never rested on each other (at 0.2 and 0.1
+// the third was pushed out and stayed two for ever; of those put there the deep ones and the slow ones).
+TEST_CASE("Who touches somebody for the first time is decided upon, however long the step") {
+  SECTION("one that two become, and a third that it grows into") {
+    for (const double h : {0.2, 0.1, 0.05, 0.01}) {
+      for (const std::size_t parts : {1U, 4U}) {
+        SimulationConfig<double> config = bouncy(h);
+        config.G = 1.0;
+        config.contactSubsteps = parts;
+        Space<double> space(config);
+        space.addBody(ball({-1.11, 0, 0}, {1, 0, 0}, 1.0));
+        space.addBody(ball({1.11, 0, 0}, {-1, 0, 0}, 1.0));
+        space.addBody(ball({0, 2.1, 0}, {0, -0.01, 0}, 1.0));
+        int asked = 0;
+        space.setCollisionHook([&](const Hit&) {
+          ++asked;
+          return Outcome::merge();
+        });
+        space.advanceTo(1.0);
+        CAPTURE(h, parts);
+        CHECK(asked == 2);
+        CHECK(space.n() == 1);
+        CHECK(space.energyLedger().correction == 0.0);
+      }
+    }
+  }
+  SECTION("two that are put there") {
+    for (const double overlap : {1e-6, 0.1}) {
+      for (const double speed : {0.005, 0.1}) {
+        for (const double h : {0.1, 0.001}) {
+          SimulationConfig<double> config = bouncy(h);
+          config.G = 1.0;  // 0.1 m/s in the longer step
+          Space<double> space(config);
+          space.addBody(ball({0, 0, 0}, {0, 0, 0}, 1.0));
+          space.addBody(ball({2 - overlap, 0, 0}, {-speed, 0, 0}, 1.0));
+          std::vector<double> speeds;
+          space.setCollisionHook([&](const Hit& hit) {
+            speeds.push_back(hit.impactSpeed);
+            return Outcome::merge();
+          });
+          advance(space, 2);
+          CAPTURE(overlap, speed, h);
+          CHECK(speeds == std::vector<double>{speed});
+          CHECK(space.n() == 1);
+        }
+      }
+    }
+  }
+}
+
+// Held by its own gravity; one of them is put elsewhere by rounding, so that each step begins anew.
+TEST_CASE("What rests in a pile in space is nobody's decision, also where a user moves it a little") {
+  SimulationConfig<double> config = bouncy(0.02);
+  config.G = 1.0;
+  Space<double> space(config);
+  const CounterRandom random(5);
+  for (std::uint64_t i = 0; i < 60; ++i) {
+    const Vec x(random.uniform(3 * i, -1, 1), random.uniform(3 * i + 1, -1, 1),
+                random.uniform(3 * i + 2, -1, 1));
+    space.addBody(ball(3 * x, {0, 0, 0}, 0.3 + 0.2 * std::abs(x[0]), 0.1));
+  }
+  space.advanceTo(40);
+  int asked = 0;
+  space.setCollisionHook([&](const Hit&) {
+    ++asked;
+    return Outcome::bounce();
+  });
+  for (std::size_t i = 0; i < 100; ++i) {
+    space.body(i % 60).position()[0] += 1e-12;
+    space.computeDynamics(i);
+  }
+  CHECK(space.contactCount() > 100);
+  CHECK(asked == 0);
+}
+
 // Seen to fail: asked once, and the contact solver stopped them at the next call as bodies that rest.
 TEST_CASE("A hook that throws is asked again about those that touch before a step has moved anything") {
   for (const std::size_t failures : {1U, 3U}) {

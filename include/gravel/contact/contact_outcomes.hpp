@@ -29,13 +29,15 @@ struct ContactOutcomes {
 /// gives them the velocities of its outcome. What rests approaches by no more than `threshold`, rounding and
 /// 2 |a_rel.n| h. Where both lean on others or stand, also by what a step's fall brings along n: of each no
 /// more than |a| h, and than others hold it with along n, the root of the sum of the squares of (n.J). For in
-/// a heap relative accelerations vanish, while nothing holds along a table.
+/// a heap relative accelerations vanish, while nothing holds along a table. Where a step begins, nothing has
+/// fallen since the last solve: two that touch and bore nothing in it do not rest on each other.
 /// O(bodies + contacts x decided), one thread.
+/// \param begins  a step does; else one, or a part of it, ends
 /// \param borne of contacts in the last solve, sorted by keys, as contacts are
 /// \param decided pairs of ids about which it was asked in this step already
 template <Real S, ContactBodies B>
 ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, const CollisionHook<S>& hook,
-                                  const S& time, const S& threshold, const S& h,
+                                  const S& time, const S& threshold, const S& h, bool begins,
                                   std::span<const StoredImpulse<S>> borne,
                                   const std::vector<std::pair<std::uint64_t, std::uint64_t>>& decided = {}) {
   ContactOutcomes<S> outcomes;
@@ -55,12 +57,14 @@ ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, con
   using Squares = Eigen::Matrix<S, 3, 3>;
   std::vector<Squares> loads(bodies.size(), Squares::Zero());  // J J^T of each body's contacts
   auto known = borne.begin();
-  for (const Contact<S>& c : contacts) {
-    const ContactKeys keys = ContactName::of(c).keys;
-    while (known != borne.end() && known->keys() < keys) {
+  const auto bears = [&](const Contact<S>& c) {  // of contacts in their order
+    while (known != borne.end() && known->keys() < c.keys()) {
       ++known;
     }
-    if (known != borne.end() && known->keys() == keys) {
+    return known != borne.end() && known->keys() == c.keys();
+  };
+  for (const Contact<S>& c : contacts) {
+    if (bears(c)) {
       const Vector3<S> j = known->impulse.normal * c.normal + known->impulse.tangential;
       loads[c.first] += j * j.transpose();
       if (c.second != staticPartner) {
@@ -78,7 +82,9 @@ ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, con
     const S most = load_sq > S(0) ? S(S(2) * sqrt(load_sq) / S(bodies.masses()[i])) : S(0);
     return detail::isMovable(bodies, i) ? std::min<S>(most, detail::safeNorm(fall(i)) * h) : S(0);
   };
+  known = borne.begin();
   for (const Contact<S>& c : contacts) {
+    const bool anew = begins && !bears(c) && !(c.gap > S(0));
     if (c.second == staticPartner ||
         std::find(decided.begin(), decided.end(), std::pair(c.key1, c.key2)) != decided.end()) {
       continue;
@@ -88,7 +94,7 @@ ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, con
     const S approach = -c.normal.dot(v_rel);
     const Vector3<S> a1 = fall(c.first);
     const Vector3<S> a2 = fall(c.second);
-    const S relative = S(2) * h * detail::sizeOf<S>(c.normal.dot(Vector3<S>(a2 - a1)));
+    const S relative = anew ? S(0) : S(S(2) * h * detail::sizeOf<S>(c.normal.dot(Vector3<S>(a2 - a1))));
     const S sizes = detail::maxAbs(detail::velocityOf(bodies, c.first)) +
                     detail::maxAbs(detail::velocityOf(bodies, c.second)) +
                     h * (detail::maxAbs(a1) + detail::maxAbs(a2));

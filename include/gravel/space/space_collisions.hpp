@@ -31,7 +31,7 @@ auto Space<Scalar, Layout>::decideCollisions(const Scalar& time) -> std::vector<
   const SimulationConfig<Scalar>& c = this->config_;
   const ContactOutcomes<Scalar> ends = decideContacts<Scalar>(
       contacts(), bodies_, contact_.collisionHook, time, std::max(c.restitutionThreshold, c.epsilon),
-      contact_dt_, contact_.memory(), decided);
+      contact_dt_, false, contact_.memory(), decided);
   for (const auto& [id1, id2] : ends.merges) {
     merges.emplace_back(BodyId{id1}, BodyId{id2});
   }
@@ -48,9 +48,10 @@ auto Space<Scalar, Layout>::decideTouching() -> std::vector<std::pair<BodyId, Bo
   if (!contact_.collisionHook) {
     return merges;
   }
-  const ContactOutcomes<Scalar> starts = decideContacts<Scalar>(
-      contacts(), bodies_, contact_.collisionHook, time_,
-      std::max<Scalar>(this->config_.restitutionThreshold, this->config_.epsilon), dt_, contact_.memory());
+  const ContactOutcomes<Scalar> starts =
+      decideContacts<Scalar>(contacts(), bodies_, contact_.collisionHook, time_,
+                             std::max<Scalar>(this->config_.restitutionThreshold, this->config_.epsilon), dt_,
+                             true, contact_.memory());
   left_.restitution += starts.restitutionLoss;
   left_.friction += starts.frictionLoss;
   left_.work -= starts.driftWork;
