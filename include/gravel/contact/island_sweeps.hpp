@@ -138,7 +138,7 @@ class IslandSweeps : private RowImpulses<S> {
       limitSweeps(own, 0, island.rows, own.remembers && island.remembers);
     }
     island.enough = std::max<S>(own.tolerance, S(8) * Eigen::NumTraits<S>::epsilon()) * island.approach;
-    island.course = SweepCourse<S>(island.enough, own.maxIterations);
+    island.course = SweepCourse<S>(island.enough, own.maxIterations, settings_.accelerate);
   }
 
   /// What was solved before may be right as it is. What is only just so would never become better.
@@ -274,7 +274,9 @@ class IslandSweeps : private RowImpulses<S> {
         row.jn = largerOf(row.jn + step.n, Pack::zero());
         row.jt = row.jt + step.t;
         row.l = row.l + step.l;
-        cutToCone(row, b1, b2);
+        auto sliding = problem_.slidesOf(group, problem_.earlier);
+        sliding.slipBefore = PackedVector<S>::zero();
+        cutToCone(row, b1, b2, sliding);
         push(b1, b2, row.wholeImpulse());
         twist(row, b1, b2, row.jt);
         if (!problem_.turning.empty()) {

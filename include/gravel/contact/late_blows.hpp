@@ -69,7 +69,7 @@ class LateBlows {
       const bool sticks = blow.decided && blow.parting == S(0);
       const S since = sticks ? blow.time : S(blow.time - h / S(2));
       const Vector3<S> lack = (pull(bodies, blow) - blow.pull) * (since / S(2));
-      if (lack == Vector3<S>::Zero()) {
+      if (detail::equalIsSame<S> && lack == Vector3<S>::Zero()) {
         continue;
       }
       const S du = -blow.normal.dot(lack);

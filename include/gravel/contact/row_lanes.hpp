@@ -256,15 +256,20 @@ template <Real S>
 
 /// The tangential impulse of `row` made to lie across its normal, and in Coulomb's cone.
 template <Real S>
+[[gnu::always_inline]] inline void cutToCone(RowLanes<S>& row, const BodyLanes<S>& b1, const BodyLanes<S>& b2,
+                                             const RowSlides<S>& sliding) {
+  const PackedVector<S> none = PackedVector<S>::zero();
+  row.jt = choose(row.jn > Packed<S>::zero(), row.jt - row.n.dot(row.jt) * row.n, none);
+  RowChanges<S> changes;
+  rubRight(row, b1, b2, none, sliding, changes);
+  row.jt = choose(changes.rubs, row.jt, none);
+}
+/// What exceeds it slides.
+template <Real S>
 [[gnu::always_inline]] inline void cutToCone(RowLanes<S>& row, const BodyLanes<S>& b1,
                                              const BodyLanes<S>& b2) {
-  using P = Packed<S>;
-  const PackedVector<S> none = PackedVector<S>::zero();
-  row.jt = choose(row.jn > P::zero(), row.jt - row.n.dot(row.jt) * row.n, none);
-  RowChanges<S> changes;
-  const typename P::Truth no = P::zero() > P::zero();
-  rubRight(row, b1, b2, none, RowSlides<S>{!no, no}, changes);
-  row.jt = choose(changes.rubs, row.jt, none);
+  const typename Packed<S>::Truth no = Packed<S>::zero() > Packed<S>::zero();
+  cutToCone(row, b1, b2, RowSlides<S>{!no, no});
 }
 
 /// The impulse j on the second bodies, its opposite on the first.

@@ -32,8 +32,9 @@ struct SweepProgress {
 template <Real S>
 class SweepCourse {
  public:
-  /// \param enough  a change that ends them \param most  sweeps, >= 1
-  SweepCourse(const S& enough, int most) : enough_(enough), most_(most) {}
+  /// \param enough  a change that ends them \param most  sweeps, >= 1 \param leaps  whoever sweeps does
+  SweepCourse(const S& enough, int most, bool leaps = false)
+      : enough_(enough), most_(most), mayLeap_(leaps && most >= patience + 2) {}
 
   /// Changes up to that are right, too.
   void allow(const S& change) { enough_ = std::max<S>(enough_, change); }
@@ -76,7 +77,8 @@ class SweepCourse {
     const S next = more || probes || leap_ > S(0) ? S(0) : shareAfter(now);
     bare_ = !more && share_ == S(0);
     share_ = next;
-    before_ = more ? S(0) : now.size;
+    bare_ = bare_ && !(leap_ > S(0));  // the next one is no sequel of this one
+    before_ = more || leap_ > S(0) ? S(0) : now.size;
   }
   /// Before the next sweep impulses are to go on by as many of their last steps; mostly 0.
   const S& leap() const { return leap_; }
@@ -102,7 +104,8 @@ class SweepCourse {
   S leapAfter(const SweepProgress<S>& now) const {
     const bool oneWay = now.along * now.along > S(1 - 1e-6) * (now.size * before_);
     const S left = before_ - now.along;
-    return oneWay && now.along > S(0) && left > S(0) ? S(now.along / left) : S(0);
+    const bool isKnown = left > S(16) * Eigen::NumTraits<S>::epsilon() * before_;
+    return oneWay && now.along > S(0) && isKnown ? S(now.along / left) : S(0);
   }
 
   S enough_;
@@ -113,7 +116,7 @@ class SweepCourse {
   S before_ = S(0);    ///< square of the changes of the last sweep
   bool bare_ = false;  ///< that one had no share
   S leap_ = S(0);
-  bool mayLeap_ = true;
+  bool mayLeap_ = false;
   S changeAtLeap_ = Eigen::NumTraits<S>::highest();  ///< at the last one
 };
 
