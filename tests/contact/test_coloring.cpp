@@ -528,8 +528,8 @@ TEST_CASE("colours and slots are those of these contacts, whatever was coloured 
   std::vector<Contact<double>> contacts = all();
   CHECK(agree(contacts));
   CHECK(agree(contacts));
-  const std::uint32_t gone =
-      contacts[contacts.size() / 2].first;  // all contacts of one body end, and come back
+  // All contacts of one body end, and come back.
+  const std::uint32_t gone = contacts[contacts.size() / 2].first;
   std::vector<Contact<double>> fewer = contacts;
   std::erase_if(fewer, [&](const Contact<double>& c) { return c.first == gone || c.second == gone; });
   CHECK(agree(fewer));

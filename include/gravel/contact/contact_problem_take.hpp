@@ -307,11 +307,7 @@ void ContactProblem<S>::takeWithGuess(const Taking<B>& taking, const Group& grou
   auto b1 = detail::BodyLanes<S>::load(bodies, group.slot1);
   auto b2 = detail::BodyLanes<S>::load(bodies, group.slot2);
   takeGuess(group, row, b1, b2);
-  push(b1, b2, row.wholeImpulse());
-  twist(row, b1, b2, row.jt);
-  if (!turning.empty()) {
-    turn(b1, b2, detail::TurningLanes<S>::load(turning, group).by(row.l, b1, b2));
-  }
+  pushAll(group, row, turning, b1, b2);
   b1.store(bodies, group.slot1, friction);
   b2.store(bodies, group.slot2, friction);
   put(group, row);

@@ -277,13 +277,10 @@ class IslandSweeps : private RowImpulses<S> {
         auto sliding = problem_.slidesOf(group, problem_.earlier);
         sliding.slipBefore = PackedVector<S>::zero();
         cutToCone(row, b1, b2, sliding);
-        push(b1, b2, row.wholeImpulse());
-        twist(row, b1, b2, row.jt);
         if (!problem_.turning.empty()) {
-          const auto turning = TurningLanes<S>::load(problem_.turning, group);
-          row.l = turning.within(row, row.l);
-          turn(b1, b2, turning.by(row.l, b1, b2));
+          row.l = TurningLanes<S>::load(problem_.turning, group).within(row, row.l);
         }
+        pushAll(group, row, problem_.turning, b1, b2);
         b1.store(problem_.bodies, group.slot1, problem_.friction);
         b2.store(problem_.bodies, group.slot2, problem_.friction);
         problem_.storeImpulses(group, row);

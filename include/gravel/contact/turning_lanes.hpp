@@ -182,4 +182,17 @@ struct TurningLanes {
   }
 };
 
+/// All impulses of these rows to bodies that have none of them. \param turning  by row; empty if nothing
+/// resists turning
+template <Real S>
+[[gnu::always_inline]] inline void pushAll(const RowGroup<S>& group, const RowLanes<S>& row,
+                                           const std::vector<TurningRow<S>>& turning, BodyLanes<S>& b1,
+                                           BodyLanes<S>& b2) {
+  push(b1, b2, row.wholeImpulse());
+  twist(row, b1, b2, row.jt);
+  if (!turning.empty()) {
+    turn(b1, b2, TurningLanes<S>::load(turning, group).by(row.l, b1, b2));
+  }
+}
+
 }  // namespace gravel::detail
