@@ -23,13 +23,9 @@ void forEachBlow(const Space<double>& space, Visit&& visit) {
     const Contact<double>& c = space.contacts()[k];
     report(c.first, c.second, c.normal, c.arm1 + c.arm2, impulses[k].normal);
   }
-  [&](const auto& any) {
-    if constexpr (requires { any.impacts(); }) {
-      for (const auto& blow : any.impacts()) {
-        report(blow.first, blow.second, blow.normal, blow.distance, blow.impulse.normal);
-      }
-    }
-  }(space);
+  for (const auto& blow : space.impacts()) {
+    report(blow.first, blow.second, blow.normal, blow.distance, blow.impulse.normal);
+  }
 }
 
 }  // namespace gravel::scenes

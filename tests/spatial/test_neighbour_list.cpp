@@ -25,7 +25,7 @@ IdPairs overlapping(const std::vector<Pair>& list, const Cloud<S>& cloud, const 
 
 template <class S>
 IdPairs fresh(const Cloud<S>& cloud, const S& margin, const Domain<S>& domain, const S& time) {
-  AllPairs<S> search;
+  BroadPhase<S> search(BroadPhaseKind::AllPairs);
   std::vector<Pair> pairs;
   search.findPairs(cloud.positions, cloud.radii, cloud.ids, margin, domain, time, pairs);
   return named(pairs, cloud);

@@ -6,6 +6,7 @@
 #include <gravel/contact/contact_search.hpp>
 #include <gravel/contact/surface_numbers.hpp>
 #include <gravel/core/memory.hpp>
+#include <gravel/core/sizes.hpp>
 
 namespace gravel::detail {
 
@@ -93,7 +94,7 @@ class BoundaryContacts {
       const S margin = marginOf(settings, radius, falls);
       const auto touch = sphereHalfSpace<S>(x, radius, wall.normal, wall.offset, margin);
       const auto approach = [&] {  // beyond what a plane that goes on changing its velocity brings
-        const S changes = S(4) * (wall.swing < S(0) ? S(-wall.swing) : wall.swing);
+        const S changes = S(4) * detail::sizeOf(wall.swing);
         return S(wall.normal.dot(Vector3<S>(wall.velocity - velocityOf(bodies, i))) - changes);
       };
       if (touch && isMovable(bodies, i) &&

@@ -6,6 +6,7 @@
 
 #include <gravel/contact/contact.hpp>
 #include <gravel/core/parallel.hpp>
+#include <gravel/core/sizes.hpp>
 
 #include <algorithm>
 #include <span>
@@ -76,8 +77,7 @@ class BoundaryList {
         const S reach = (radii[i] + room) * slack;
         bool close = false;
         for (const HalfSpace<S>& wall : walls_) {
-          const S rounding =
-              (detail::maxAbs(x) + (wall.offset < S(0) ? S(-wall.offset) : wall.offset)) * (slack - S(1));
+          const S rounding = (detail::maxAbs(x) + detail::sizeOf(wall.offset)) * (slack - S(1));
           close = close || !(wall.normal.dot(x) - wall.offset > reach + rounding);
         }
         if (close) {

@@ -10,6 +10,7 @@
 /// includes the drift, and -J.drift is the work done by it.
 
 #include <gravel/contact/contact_problem.hpp>
+#include <gravel/core/sizes.hpp>
 
 #include <algorithm>
 #include <array>
@@ -228,7 +229,7 @@ class ContactEnergy {
     gains_.assign(colouring.islands().size(), Gain{});
     const auto take = [&](Gain& gain, std::size_t k) {
       gain.sum += terms_[k];
-      gain.size += terms_[k] < S(0) ? S(-terms_[k]) : terms_[k];
+      gain.size += sizeOf(terms_[k]);
     };
     parallelForTasks<Share::Alike>(colouring.bundles(), [&](std::size_t bundle) {
       for (const ContactColoring::Part& rows : colouring.coloursOf(bundle)) {

@@ -12,7 +12,6 @@
 
 #include <array>
 #include <limits>
-#include <span>
 #include <vector>
 
 namespace gravel {
@@ -79,16 +78,6 @@ struct ImpactReport {
 
 /// Nobody else decides what an impact does.
 struct NoDecision {};
-
-/// Candidates that are known to suffice for every course that a body may take.
-struct FixedCandidates {
-  std::span<const Pair> list;
-
-  std::span<const Pair> pairs() const { return list; }
-  static std::uint64_t version() { return 0; }
-  template <class B, class S>
-  void follow(const B&, std::uint32_t, const S&, std::vector<Pair>&) {}
-};
 
 /// How bodies will fly from where a step begins, while their accelerations last: for ImpactForecast alone.
 template <Real S>

@@ -5,6 +5,7 @@
 
 #include <gravel/contact/impulses.hpp>
 #include <gravel/contact/resting_gap.hpp>
+#include <gravel/core/sizes.hpp>
 
 #include <algorithm>
 #include <optional>
@@ -120,8 +121,7 @@ std::optional<Scalar> timeOfImpact(const RelativeFlight<Scalar>& flight, const V
   const Scalar v_n = normal.dot(flight.v);
   const Scalar a_n = normal.dot(flight.a);
   const Scalar& h = flight.h;
-  const Scalar size = r_n < Scalar(0) ? Scalar(-r_n) : r_n;
-  const Scalar rounding = detail::gapRounding<Scalar>(flight, reach, Scalar(reach + size));
+  const Scalar rounding = detail::gapRounding<Scalar>(flight, reach, Scalar(reach + detail::sizeOf(r_n)));
   return firstTouch<Scalar>(from, h, rounding, [&](const Scalar& t, Scalar& gap, Scalar& u, Scalar& bound) {
     gap = r_n - reach + v_n * t - a_n * (t * (h - t) / Scalar(2));
     u = -(v_n + a_n * (t - h / Scalar(2)));

@@ -11,6 +11,7 @@
 
 #include <gravel/core/check.hpp>
 #include <gravel/core/parallel.hpp>
+#include <gravel/core/sizes.hpp>
 #include <gravel/dynamics/integrator.hpp>
 #include <gravel/spatial/domain.hpp>
 
@@ -112,10 +113,9 @@ class Epicycle {
     }
   };
 
-  static Scalar size(const Scalar& x) { return x < Scalar(0) ? Scalar(-x) : x; }
   /// [rad]
   static Scalar fastestTurn(const HillFrame<Scalar>& frame, const Scalar& h) {
-    return std::max<Scalar>(size(frame.omega * h), size(frame.vertical * h));
+    return std::max(detail::sizeOf(Scalar(frame.omega * h)), detail::sizeOf(Scalar(frame.vertical * h)));
   }
 
   void add(const Vector3<Scalar>& x, const Vector3<Scalar>& v, Vector3<Scalar>& dx,

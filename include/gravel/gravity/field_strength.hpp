@@ -63,8 +63,9 @@ class FieldStrength {
                    isUneven_[g] != 0 ? &around : nullptr);
         }
         if (!images.isOpen()) {
-          around.far += field.at(images, group.centre);
-          a += field.at(images, group.centre);
+          const Vector3<F> far = field.at(images, group.centre);
+          around.far += far;
+          a += far;
         }
         strength_[g] = F(a.norm());
         if (isUneven_[g] != 0) {

@@ -18,12 +18,10 @@ struct WalkLimits {
 struct WalkCount {
   std::size_t expansions = 0;  ///< pairs of cells, one direction
   std::size_t pairs = 0;       ///< pairs of bodies, one direction
-  std::size_t tests = 0;
 
   WalkCount& operator+=(const WalkCount& other) {
     expansions += other.expansions;
     pairs += other.pairs;
-    tests += other.tests;
     return *this;
   }
 };
@@ -147,7 +145,6 @@ class MultipoleWalk {
       }
       return;
     }
-    ++count_.tests;
     const std::uint64_t pairs = std::uint64_t(sink.count()) * source.count();
     // NOLINTNEXTLINE(bugprone-branch-clone): the order counts, the cheap test before the dear one
     if (pairs <= limits_.pairsBelowExpansion) {

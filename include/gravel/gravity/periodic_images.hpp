@@ -3,6 +3,7 @@
 /// \file
 /// The images of a periodic system: which are near and summed one by one, and what all the others do.
 
+#include <gravel/core/sizes.hpp>
 #include <gravel/gravity/image_plan.hpp>
 #include <gravel/gravity/lattice_sums.hpp>
 #include <gravel/spatial/domain.hpp>
@@ -46,7 +47,6 @@ class PeriodicImages {
     domain_ = domain;
     time_ = time;
   }
-  const Domain<S>& domain() const { return domain_; }
   bool isOpen() const { return domain_.isOpen(); }
   bool isPlane() const { return domain_.kind() == DomainKind::ShearPeriodic; }
 
@@ -156,7 +156,7 @@ class PeriodicImages {
   /// Adds to the local expansion of a slab, up to `most` orders, what far images of bodies of given moments
   /// do that are `below` slabs below it.
   void addFar(const F& below, const std::vector<F>& moments, std::vector<F>& local, int most) const {
-    const F distance = below < F(0) ? F(-below) : below;
+    const F distance = sizeOf(below);
     const int order = std::min(most, orderAt(distance));
     const auto contract = [&](const std::vector<F>& derivatives) {
       X::contract(order, 0, order, moments.data(), derivatives.data(), local.data());
@@ -217,10 +217,9 @@ class PeriodicImages {
     return std::min(order, plan_.order);
   }
 
+  Vector3<F> wide(const Vector3<S>& v) const { return Vector3<F>(F(v[0]), F(v[1]), F(v[2])) * perUnit_; }
+
   std::vector<F> derivativesAbove(const F& slabs, int order) const {
-    const auto wide = [this](const Vector3<S>& v) {
-      return Vector3<F>(Vector3<F>(F(v[0]), F(v[1]), F(v[2])) * perUnit_);
-    };
     std::vector<Vector3<F>> near;
     for (const Vector3<S>& s : shifts_) {
       near.push_back(wide(s));
@@ -250,8 +249,7 @@ class PeriodicImages {
   static void shorten(Vector3<S>& a, Vector3<S>& b) {
     const auto subtract = [](Vector3<S>& v, const Vector3<S>& from) {
       bool isShorter = false;
-      for (S twice = S(2) * v.dot(from);
-           from.squaredNorm() < S(0.999999) * (twice < S(0) ? S(-twice) : twice);
+      for (S twice = S(2) * v.dot(from); from.squaredNorm() < S(0.999999) * detail::sizeOf(twice);
            twice = S(2) * v.dot(from)) {
         v -= twice < S(0) ? Vector3<S>(-from) : from;
         isShorter = true;
@@ -287,9 +285,6 @@ class PeriodicImages {
       }
     }
     const auto near = [this](const Point& p) { return isNear(p); };
-    const auto wide = [this](const Vector3<S>& v) {
-      return Vector3<F>(Vector3<F>(F(v[0]), F(v[1]), F(v[2])) * perUnit_);
-    };
     if (isPlane()) {
       derivatives_ = Sums::plane(wide(a_), wide(b_), plan_.order, bound, near);
       background_ = F(0);

@@ -23,7 +23,7 @@ class TreeMoments {
     for (std::size_t level = tree.levels.size() - 1; level-- > 0;) {
       const std::size_t begin = tree.levels[level];
       parallelForChunks(tree.levels[level + 1] - begin, 64, [&](std::size_t from, std::size_t to) {
-        Scratch scratch(order, terms_);
+        Scratch scratch(terms_);
         for (std::size_t c = begin + from; c < begin + to; ++c) {
           TreeCell<F>& cell = tree.cells[c];
           if (cell.isLeaf() || cell.count() <= bodiesWorthMeasuring) {
@@ -56,7 +56,7 @@ class TreeMoments {
 
   struct Scratch {
     std::vector<V> regular, moments, sums;
-    Scratch(int, std::size_t terms) : regular(terms), moments(terms), sums(terms) {}
+    explicit Scratch(std::size_t terms) : regular(terms), moments(terms), sums(terms) {}
   };
 
   void measure(const Tree& tree, TreeCell<F>& cell) const {

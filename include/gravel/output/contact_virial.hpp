@@ -3,10 +3,11 @@
 /// \file
 /// Errors of a whole heap without a reference solution: do its contacts carry what presses on them?
 
+#include <gravel/bodies/bodies.hpp>
 #include <gravel/contact/contact.hpp>
 #include <gravel/contact/contact_settings.hpp>
 #include <gravel/core/parallel.hpp>
-#include <gravel/output/conserved.hpp>
+#include <gravel/core/sizes.hpp>
 
 #include <span>
 
@@ -28,10 +29,9 @@ struct ContactVirial {
   Scalar sum() const { return motion + forces + contacts + boundaries; }
   /// |sum| over the largest term; 0 where there is nothing.
   Scalar residual() const {
-    const auto size = [](const Scalar& x) { return x < Scalar(0) ? Scalar(-x) : x; };
-    const Scalar scale =
-        std::max(std::max(size(motion), size(forces)), std::max(size(contacts), size(boundaries)));
-    return scale > Scalar(0) ? Scalar(size(sum()) / scale) : Scalar(0);
+    const Scalar scale = std::max({detail::sizeOf(motion), detail::sizeOf(forces), detail::sizeOf(contacts),
+                                   detail::sizeOf(boundaries)});
+    return scale > Scalar(0) ? Scalar(detail::sizeOf(sum()) / scale) : Scalar(0);
   }
 };
 
@@ -47,7 +47,7 @@ struct SupportedWeight {
   Scalar residual() const {
     const Scalar w_sq = weight.squaredNorm();
     const Scalar missing = weight.dot(Vector3<Scalar>(load - weight));
-    return w_sq > Scalar(0) ? Scalar((missing < Scalar(0) ? Scalar(-missing) : missing) / w_sq) : Scalar(0);
+    return w_sq > Scalar(0) ? Scalar(detail::sizeOf(missing) / w_sq) : Scalar(0);
   }
 };
 

@@ -11,14 +11,6 @@ template <Real S>
 class AllPairs {
  public:
   /// Every pair with |r_ij| < r_i + r_j + margin. O(N^2); rows are shared between threads.
-  /// \throws std::invalid_argument for positions or radii that are not finite, or negative radii
-  template <class Positions, class Radii, class Ids>
-  void findPairs(const Positions& positions, const Radii& radii, const Ids& ids, const S& margin,
-                 const Domain<S>& domain, const S& time, std::vector<Pair>& out) {
-    detail::gatherSpheres(positions, radii, ids, domain, time, spheres_);
-    findPairs(spheres_, margin, domain, time, out);
-  }
-
   void findPairs(const std::vector<detail::Sphere<S>>& spheres, const S& margin, const Domain<S>& domain,
                  const S& time, std::vector<Pair>& out) {
     const std::size_t n = spheres.size();
@@ -37,7 +29,6 @@ class AllPairs {
   }
 
  private:
-  std::vector<detail::Sphere<S>> spheres_;
   std::vector<std::vector<Pair>> parts_;
 };
 

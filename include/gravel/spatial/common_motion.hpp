@@ -126,7 +126,7 @@ class CommonMotion {
   void shear(const S& ahead) { ahead_ = ahead; }
   const S& ahead() const { return ahead_; }
   /// [1] Its size.
-  S shearing() const { return ahead_ < S(0) ? S(-ahead_) : ahead_; }
+  S shearing() const { return sizeOf(ahead_); }
   /// [1] What ways use of a skin, with the shear of what they cross meanwhile, over their length.
   S spread() const { return S(1) + S(2) * shearing(); }
 

@@ -60,7 +60,6 @@ class UniformGrid {
   }
 
   std::size_t size() const { return entries_.size(); }
-  S cell() const { return cell_; }
 
   /// Points in the cell of a point, on average over the points: what a query has to look through.
   double crowding() const {
@@ -111,9 +110,9 @@ class UniformGrid {
   }
   static constexpr S spare = S(65) / S(64);
 
-  /// Calls visit(index1, index2) for two points nearer than cell(), one of which lies in a cell of [begin,
-  /// end), and the other in the same cell or in one of the 13 neighbours after it: over all cells each two
-  /// such points once. Safe from several threads at once. O(cells + points met).
+  /// Calls visit(index1, index2) for two points nearer than the edge of a cell, one of which lies in a cell
+  /// of [begin, end), and the other in the same cell or in one of the 13 neighbours after it: over all cells
+  /// each two such points once. Safe from several threads at once. O(cells + points met).
   template <class Visitor>
   void forEachPair(std::size_t begin, std::size_t end, Visitor&& visit) const {
     for (std::size_t c = begin; c < end; ++c) {
@@ -186,22 +185,7 @@ class UniformGrid {
 template <std::floating_point S>
 class GridPairs {
  public:
-  /// Every pair with |r_ij| < r_i + r_j + margin; queries are shared between threads.
-  /// \throws std::invalid_argument for positions or radii that are not finite, or negative radii
-  template <class Positions, class Radii, class Ids>
-  void findPairs(const Positions& positions, const Radii& radii, const Ids& ids, const S& margin,
-                 const Domain<S>& domain, const S& time, std::vector<Pair>& out) {
-    detail::gatherSpheres(positions, radii, ids, domain, time, spheres_);
-    findPairs(spheres_, margin, domain, time, out);
-  }
-
-  void findPairs(const std::vector<detail::Sphere<S>>& spheres, const S& margin, const Domain<S>& domain,
-                 const S& time, std::vector<Pair>& out) {
-    build(spheres, margin);
-    search(spheres, margin, domain, time, out);
-  }
-
-  /// The two halves of findPairs, for those who look at the grid in between.
+  /// First of all: the grid, by which it can be chosen to go on.
   const UniformGrid<S>& build(const std::vector<detail::Sphere<S>>& spheres, const S& margin) {
     S sum(0);
     std::size_t count = 0;
@@ -214,8 +198,11 @@ class GridPairs {
     grid_.build(detail::Homes<S>{&spheres}, cell > S(0) ? cell : S(1));
     return grid_;
   }
-  void search(const std::vector<detail::Sphere<S>>& spheres, const S& margin, const Domain<S>& domain,
-              const S& time, std::vector<Pair>& out) {
+
+  /// Of the spheres of build(), every pair with |r_ij| < r_i + r_j + margin; queries are shared between
+  /// threads.
+  void findPairs(const std::vector<detail::Sphere<S>>& spheres, const S& margin, const Domain<S>& domain,
+                 const S& time, std::vector<Pair>& out) {
     const S widest = S(2) * detail::LargestRadii<S>(spheres).largest + margin;
     if (domain.isOpen() && grid_.cells() > 0 && grid_.neighboursReach(widest)) {
       // Spheres of nearly one size, as they mostly are: each two looked at once.
@@ -236,7 +223,6 @@ class GridPairs {
 
  private:
   UniformGrid<S> grid_;
-  std::vector<detail::Sphere<S>> spheres_;
   std::vector<std::vector<Pair>> parts_;
 };
 

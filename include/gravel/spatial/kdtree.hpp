@@ -138,14 +138,6 @@ template <std::floating_point S>
 class KDTreePairs {
  public:
   /// Every pair with |r_ij| < r_i + r_j + margin; queries are shared between threads.
-  /// \throws std::invalid_argument for positions or radii that are not finite, or negative radii
-  template <class Positions, class Radii, class Ids>
-  void findPairs(const Positions& positions, const Radii& radii, const Ids& ids, const S& margin,
-                 const Domain<S>& domain, const S& time, std::vector<Pair>& out) {
-    detail::gatherSpheres(positions, radii, ids, domain, time, spheres_);
-    findPairs(spheres_, margin, domain, time, out);
-  }
-
   void findPairs(const std::vector<detail::Sphere<S>>& spheres, const S& margin, const Domain<S>& domain,
                  const S& time, std::vector<Pair>& out) {
     tree_.build(detail::Homes<S>{&spheres});
@@ -154,7 +146,6 @@ class KDTreePairs {
 
  private:
   KDTree<S> tree_;
-  std::vector<detail::Sphere<S>> spheres_;
   std::vector<std::vector<Pair>> parts_;
 };
 

@@ -3,6 +3,7 @@
 /// \file
 /// Candidate pairs that are found with a skin and kept until a body has moved half of it (Verlet 1967).
 
+#include <gravel/core/sizes.hpp>
 #include <gravel/spatial/broad_phase.hpp>
 #include <gravel/spatial/strays.hpp>
 
@@ -134,7 +135,7 @@ class NeighbourList {
       return "the domain changed";
     }
     flow_ = S(1.5) * domain.omega() * (time - time_);
-    const S drift = (flow_ < S(0) ? S(-flow_) : flow_) + common_.shearing();
+    const S drift = detail::sizeOf(flow_) + common_.shearing();
     free_ = (room_ - alongside(margin, drift)) / common_.spread();
     if (free_ < S(0)) {
       return margin > S(0) ? "the margin grew or the flow used up the skin" : "the flow used up the skin";
