@@ -10,8 +10,12 @@
 #include <gravel/core/check.hpp>
 
 #include <utility>
+#include <vector>
 
 namespace gravel {
+
+/// Two bodies each, the smaller id first.
+using BodyPairs = std::vector<std::pair<BodyId, BodyId>>;
 
 /// Two bodies at the moment at which they hit each other.
 template <Real Scalar>

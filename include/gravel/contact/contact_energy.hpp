@@ -229,7 +229,7 @@ class ContactEnergy {
     gains_.assign(colouring.islands().size(), Gain{});
     const auto take = [&](Gain& gain, std::size_t k) {
       gain.sum += terms_[k];
-      gain.size += sizeOf(terms_[k]);
+      gain.size += detail::sizeOf(terms_[k]);
     };
     parallelForTasks<Share::Alike>(colouring.bundles(), [&](std::size_t bundle) {
       for (const ContactColoring::Part& rows : colouring.coloursOf(bundle)) {

@@ -19,10 +19,10 @@ namespace gravel {
 /// What a user decided of the contacts of a step, but for the velocities, which the bodies have by now.
 template <Real Scalar>
 struct ContactOutcomes {
-  std::vector<std::pair<std::uint64_t, std::uint64_t>> merges;  ///< ids, in the order of contacts
-  Scalar restitutionLoss = Scalar(0);                           ///< [J] of velocities that the user gave
-  Scalar frictionLoss = Scalar(0);                              ///< [J] of spins
-  Scalar driftWork = Scalar(0);  ///< [J] put in by the shear of the domain, as in ContactReport
+  BodyPairs merges;                    ///< in the order of contacts
+  Scalar restitutionLoss = Scalar(0);  ///< [J] of velocities that the user gave
+  Scalar frictionLoss = Scalar(0);     ///< [J] of spins
+  Scalar driftWork = Scalar(0);        ///< [J] put in by the shear of the domain, as in ContactReport
 };
 
 /// Asks `hook` about each contact of two bodies that approach faster than what rests picks up in a step, and
@@ -31,15 +31,15 @@ struct ContactOutcomes {
 /// more than |a| h, and than others hold it with along n, the root of the sum of the squares of (n.J). For in
 /// a heap relative accelerations vanish, while nothing holds along a table. Where a step begins, nothing has
 /// fallen since the last solve: two that touch and bore nothing in it do not rest on each other.
-/// O(bodies + contacts x decided), one thread.
+/// O(bodies + contacts log decided), one thread.
 /// \param begins  a step does; else one, or a part of it, ends
 /// \param borne of contacts in the last solve, sorted by keys, as contacts are
-/// \param decided pairs of ids about which it was asked in this step already
+/// \param decided those about which it was asked in this step already; then those that it was asked about
+/// now, too
 template <Real S, ContactBodies B>
 ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, const CollisionHook<S>& hook,
                                   const S& time, const S& threshold, const S& h, bool begins,
-                                  std::span<const StoredImpulse<S>> borne,
-                                  const std::vector<std::pair<std::uint64_t, std::uint64_t>>& decided = {}) {
+                                  std::span<const StoredImpulse<S>> borne, BodyPairs& decided) {
   ContactOutcomes<S> outcomes;
   const auto partner = [&](std::uint32_t i, std::uint64_t id) {
     return typename Collision<S>::Partner{BodyId{id},
@@ -82,11 +82,12 @@ ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, con
     const S most = load_sq > S(0) ? S(S(2) * sqrt(load_sq) / S(bodies.masses()[i])) : S(0);
     return detail::isMovable(bodies, i) ? std::min<S>(most, detail::safeNorm(fall(i)) * h) : S(0);
   };
+  std::sort(decided.begin(), decided.end());
+  const auto before = static_cast<std::ptrdiff_t>(decided.size());
   known = borne.begin();
   for (const Contact<S>& c : contacts) {
     const bool anew = begins && !bears(c) && !(c.gap > S(0));
-    if (c.second == staticPartner ||
-        std::find(decided.begin(), decided.end(), std::pair(c.key1, c.key2)) != decided.end()) {
+    if (c.second == staticPartner) {
       continue;
     }
     const Vector3<S> v_rel =
@@ -102,15 +103,18 @@ ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, con
     const S rest = stands(c.first) && stands(c.second)
                        ? std::max<S>(relative, held(c.first, c.normal) + held(c.second, c.normal))
                        : relative;
-    if (!(approach > threshold + noise + rest)) {
+    const std::pair pair(BodyId{c.key1}, BodyId{c.key2});
+    if (!(approach > threshold + noise + rest) ||
+        std::binary_search(decided.begin(), decided.begin() + before, pair)) {
       continue;
     }
+    decided.push_back(pair);
     const Collision<S> hit{
         time,    partner(c.first, c.key1), partner(c.second, c.key2), c.normal, v_rel, contacts.material(c),
         approach};
     const CollisionOutcome<S> outcome = detail::outcomeOf(hook, hit);
     if (outcome.kind == CollisionKind::Merge) {
-      outcomes.merges.emplace_back(c.key1, c.key2);
+      outcomes.merges.push_back(pair);
     } else if (outcome.kind == CollisionKind::Velocities) {
       const auto give = [&](std::uint32_t i, const auto& side, const Vector3<S>& v, const Vector3<S>& w) {
         if (side.fixed) {

@@ -139,7 +139,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
   }
 
   /// Pairs of ids that shall merge, in the order of the impacts of the last call.
-  const std::vector<std::pair<std::uint64_t, std::uint64_t>>& merges() const { return merges_; }
+  const BodyPairs& merges() const { return merges_; }
   /// Pairs that follow() added in the last call.
   const std::vector<Pair>& candidatesAdded() const { return late_; }
   /// The blows of the last call, in the order in which they were dealt.
@@ -215,7 +215,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     const bool merges = outcome.kind == CollisionKind::Merge;
     if (merges) {
       if (!stick) {
-        merges_.emplace_back(event.key1, event.key2);
+        merges_.emplace_back(BodyId{event.key1}, BodyId{event.key2});
       }
       outcome = Base::asOne(scene, event, at, v_rel);
     }

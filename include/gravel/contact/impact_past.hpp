@@ -173,7 +173,7 @@ class ImpactPast {
   std::vector<std::uint32_t> struck_;  ///< by the blows of this moment
   std::vector<Impact<S>> impacts_;
   std::vector<std::uint32_t> earlier_;  ///< of an impact that rests: the one before of the same first body
-  std::vector<std::pair<std::uint64_t, std::uint64_t>> merges_;
+  BodyPairs merges_;
 };
 
 }  // namespace gravel::detail

@@ -74,7 +74,7 @@ class ContactStage {
                 Profiler& profiler);
 
   /// Pairs of ids that a user lets merge after impacts inside the last part of the step.
-  const std::vector<std::pair<std::uint64_t, std::uint64_t>>& merges() const { return impacts_.merges(); }
+  const BodyPairs& merges() const { return impacts_.merges(); }
   const std::vector<Impact<Scalar>>& impactsOfPart() const { return impacts_.impacts(); }
 
   /// All that touched: contacts() with impulses(), and after them impacts().
@@ -126,7 +126,7 @@ class ContactStage {
   void tellChanges(const Bodies& bodies, const Scalar& kick, ContactKicks<Scalar>& kicks) const;
 
   /// Bodies merged, and the step goes on: contacts of these pairs of ids are not what they were.
-  void endMerged(const Bodies& bodies, const std::vector<std::pair<BodyId, BodyId>>& merges);
+  void endMerged(const Bodies& bodies, const BodyPairs& merges);
 
   /// \throws std::invalid_argument for a sphere that would touch its own image
   void checkSizes(const Bodies& bodies) const;

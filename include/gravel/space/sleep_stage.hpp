@@ -160,7 +160,7 @@ class SleepStage {
   }
 
   /// What has become of these pairs of ids has been slow for no time.
-  void startAnew(const Bodies& bodies, const std::vector<std::pair<BodyId, BodyId>>& merges) {
+  void startAnew(const Bodies& bodies, const BodyPairs& merges) {
     follow(bodies);
     for (const auto& [one, other] : merges) {
       for (const BodyId id : {one, other}) {

@@ -269,9 +269,9 @@ class Space : public Settings<Scalar> {
   void rememberPlaces();
   bool placesChanged() const;
   Scalar bindingEnergy(std::size_t i, const Scalar& time) const;
-  std::vector<std::pair<BodyId, BodyId>> decideCollisions(const Scalar& time);
-  std::vector<std::pair<BodyId, BodyId>> decideTouching();
-  void mergeCollided(const std::vector<std::pair<BodyId, BodyId>>& merges, const Scalar& time);
+  BodyPairs decideCollisions(const Scalar& time);
+  BodyPairs decideTouching(const Scalar& time, const Scalar& h, bool begins, BodyPairs& decided);
+  void mergeCollided(const BodyPairs& merges, const Scalar& time);
   void merge(BodyId stays, BodyId goes, const Scalar& time);
   Scalar pairEnergy(std::size_t i, std::size_t j, const Scalar& time) const;
   Scalar potentialEnergy() const;

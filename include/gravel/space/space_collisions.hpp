@@ -14,58 +14,44 @@ namespace gravel {
 /// Pairs that shall merge after this part of a step: those of the impacts inside it in their order, then
 /// contacts at its end, `time`.
 template <Real Scalar, class Layout>
-auto Space<Scalar, Layout>::decideCollisions(const Scalar& time) -> std::vector<std::pair<BodyId, BodyId>> {
-  std::vector<std::pair<BodyId, BodyId>> merges;
-  if (!contact_.collisionHook) {
-    return merges;
-  }
-  auto decided = contact_.merges();
-  for (const auto& [id1, id2] : decided) {
-    merges.emplace_back(BodyId{id1}, BodyId{id2});
-  }
-  for (const Impact<Scalar>& impact : contact_.impactsOfPart()) {
-    if (impact.decided && impact.rests) {
-      decided.emplace_back(impact.key1, impact.key2);
+BodyPairs Space<Scalar, Layout>::decideCollisions(const Scalar& time) {
+  BodyPairs merges;
+  if (contact_.collisionHook) {
+    merges = contact_.merges();
+    BodyPairs decided = merges;
+    for (const Impact<Scalar>& impact : contact_.impactsOfPart()) {
+      if (impact.decided && impact.rests) {
+        decided.emplace_back(BodyId{impact.key1}, BodyId{impact.key2});
+      }
     }
+    const BodyPairs ends = decideTouching(time, contact_dt_, false, decided);
+    merges.insert(merges.end(), ends.begin(), ends.end());
   }
-  const SimulationConfig<Scalar>& c = this->config_;
-  const ContactOutcomes<Scalar> ends = decideContacts<Scalar>(
-      contacts(), bodies_, contact_.collisionHook, time, std::max(c.restitutionThreshold, c.epsilon),
-      contact_dt_, false, contact_.memory(), decided);
-  for (const auto& [id1, id2] : ends.merges) {
-    merges.emplace_back(BodyId{id1}, BodyId{id2});
-  }
-  left_.restitution += ends.restitutionLoss;
-  left_.friction += ends.frictionLoss;
-  left_.work -= ends.driftWork;
   return merges;
 }
 
-/// Bodies that touch and approach where a step begins anew, since nothing has met them on their way.
+/// Bodies that touch and approach. \param begins a step does: nothing has met them on their way
+/// \param decided as in decideContacts()
 template <Real Scalar, class Layout>
-auto Space<Scalar, Layout>::decideTouching() -> std::vector<std::pair<BodyId, BodyId>> {
-  std::vector<std::pair<BodyId, BodyId>> merges;
+BodyPairs Space<Scalar, Layout>::decideTouching(const Scalar& time, const Scalar& h, bool begins,
+                                                BodyPairs& decided) {
   if (!contact_.collisionHook) {
-    return merges;
+    return {};
   }
-  const ContactOutcomes<Scalar> starts =
-      decideContacts<Scalar>(contacts(), bodies_, contact_.collisionHook, time_,
-                             std::max<Scalar>(this->config_.restitutionThreshold, this->config_.epsilon), dt_,
-                             true, contact_.memory());
-  left_.restitution += starts.restitutionLoss;
-  left_.friction += starts.frictionLoss;
-  left_.work -= starts.driftWork;
-  for (const auto& [id1, id2] : starts.merges) {
-    merges.emplace_back(BodyId{id1}, BodyId{id2});
-  }
-  return merges;
+  const SimulationConfig<Scalar>& c = this->config_;
+  ContactOutcomes<Scalar> outcomes = decideContacts<Scalar>(
+      contacts(), bodies_, contact_.collisionHook, time, std::max<Scalar>(c.restitutionThreshold, c.epsilon),
+      h, begins, contact_.memory(), decided);
+  left_.restitution += outcomes.restitutionLoss;
+  left_.friction += outcomes.frictionLoss;
+  left_.work -= outcomes.driftWork;
+  return std::move(outcomes.merges);
 }
 
 /// One after the other. Of two, the fixed one stays, else the heavier, else the one of the smaller id; a
 /// third that meets the one that went meets the one that stayed.
 template <Real Scalar, class Layout>
-void Space<Scalar, Layout>::mergeCollided(const std::vector<std::pair<BodyId, BodyId>>& merges,
-                                          const Scalar& time) {
+void Space<Scalar, Layout>::mergeCollided(const BodyPairs& merges, const Scalar& time) {
   if (merges.empty()) {
     return;
   }

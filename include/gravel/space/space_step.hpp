@@ -141,6 +141,7 @@ template <Real Scalar, class Layout>
 void Space<Scalar, Layout>::prepare(const Scalar& h) {
   check(h);
   contact_.setIdle(false);  // until fallAsleep() has looked at those that came or woke
+  BodyPairs decided;        // at this moment
   for (wakeTheChanged(); !forcesValid_ || placesChanged(); wakeTheChanged()) {
     forcesValid_ = false;  // if a hook throws
     applyGravity();
@@ -152,9 +153,16 @@ void Space<Scalar, Layout>::prepare(const Scalar& h) {
       sleep_.lookForTouch(bodies_, contact_);
       sleep_.wake(bodies_, contact_);
     }
-    const std::vector<std::pair<BodyId, BodyId>> merges = decideTouching();
+    const BodyPairs merges = decideTouching(time_, dt_, true, decided);
     forcesValid_ = true;
     mergeCollided(merges, time_);
+    std::vector<BodyId> others;  // who took in another is asked about anew
+    for (const auto& [one, other] : merges) {
+      others.insert(others.end(), {one, other});
+    }
+    std::sort(others.begin(), others.end());
+    const auto isOther = [&](BodyId id) { return std::binary_search(others.begin(), others.end(), id); };
+    std::erase_if(decided, [&](const auto& pair) { return isOther(pair.first) || isOther(pair.second); });
   }
   fallAsleep();
 }

@@ -233,7 +233,7 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
   if (!held) {
     makeUpBlows(span);
   }
-  const std::vector<std::pair<BodyId, BodyId>> merges = decideCollisions(Scalar(time_ + end));
+  const BodyPairs merges = decideCollisions(Scalar(time_ + end));
   const bool anew = !last && !merges.empty();  // forces are found once more
   if (anew && held) {
     const Scalar passed = end - found;
