@@ -145,9 +145,12 @@ void Space<Scalar, Layout>::prepare(const Scalar& h) {
   for (wakeTheChanged(); !forcesValid_ || placesChanged(); wakeTheChanged()) {
     forcesValid_ = false;  // if a hook throws
     applyGravity();
+    stepGoesOn_ = false;
+    if (steps_ == 0) {  // contacts are taken to rest by what falls in a step, of which none has been
+      updateAdaptiveTimeStep();
+    }
     buildCollisionGraph();
     rememberPlaces();
-    stepGoesOn_ = false;
     updateAdaptiveTimeStep();
     if (!sleep_.empty()) {  // a sleeper is no fixed body to whoever decides
       sleep_.lookForTouch(bodies_, contact_);
