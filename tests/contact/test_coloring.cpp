@@ -440,7 +440,8 @@ TEST_CASE(
   CHECK(same);
 }
 
-// Rows of one block would be written over those of another. Seen to fail: taken as they come.
+// Rows of one block would be written over those of another, and impulses handed on to the wrong ones. Seen to
+// fail: taken as they come; those in the order of their first bodies taken.
 TEST_CASE("contacts out of the order of their keys are refused") {
   const Bodies<double, SoA> bodies = someFixed(4, 50);
   const std::vector<Contact<double>> contacts{{1, 2, 1, 2, {1, 0, 0}, -1.0, 1.0, 1.0},
@@ -453,6 +454,9 @@ TEST_CASE("contacts out of the order of their keys are refused") {
   const std::vector<Contact<double>> two{contacts[0], contacts[2]};  // firsts in the order of appearance
   CHECK_THROWS_WITH(coloring.build(std::span<const Contact<double>>(two), bodies),
                     ContainsSubstring("place of a contact is 1"));
+  const std::vector<Contact<double>> seconds{contacts[2], contacts[3], contacts[0], contacts[1]};
+  CHECK_THROWS_WITH(coloring.build(std::span<const Contact<double>>(seconds), bodies),
+                    ContainsSubstring("place of a contact is 2"));
 }
 
 // Seen to fail: a task for each part.

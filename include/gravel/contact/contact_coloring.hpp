@@ -37,8 +37,7 @@ class ContactColoring {
   using Row = detail::SlotRow;
 
   /// \param contacts sorted by keys, which are the ids of the bodies
-  /// \throws std::invalid_argument for a contact of a body that is not there, or of a body with itself, or
-  /// out of order
+  /// \throws std::invalid_argument for a contact of no body or of a body with itself, or out of order
   template <Real S, ContactBodies B>
   void build(std::span<const Contact<S>> contacts, const B& bodies) {
     takeEnds(contacts, bodies.size());
@@ -120,6 +119,9 @@ class ContactColoring {
     detail::resizeSparingly(byContact_, contacts.size());
     parallelFor(contacts.size(), chunk, [&](std::size_t k) {
       detail::requireBodies(contacts[k], bodies);
+      if (k > 0 && contacts[k].keys() < contacts[k - 1].keys()) {
+        detail::refuse("place of a contact", std::to_string(k), "that in the order of keys");
+      }
       byContact_[k] = {static_cast<std::uint32_t>(k), contacts[k].first, contacts[k].second};
     });
   }

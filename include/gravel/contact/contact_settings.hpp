@@ -84,12 +84,12 @@ struct WayAhead {
 /// What a solve did.
 template <Real Scalar>
 struct ContactReport {
-  std::size_t contacts = 0;
-  std::size_t colours = 0;
+  std::size_t contacts = 0;     ///< of the last solve
+  std::size_t colours = 0;      ///< the same
   std::size_t impacts = 0;      ///< blows that were dealt at their own time inside the step
   std::size_t postponed = 0;    ///< bodies with so many blows in the step that the rest was solved at its end
-  int iterations = 0;           ///< sweeps, of the island that took most
-  std::size_t looks = 0;        ///< contacts that were looked at, over all sweeps
+  int iterations = 0;           ///< sweeps of the island that took most, summed over solves
+  std::size_t looks = 0;        ///< contacts that were looked at, over all sweeps and solves
   Scalar residual = Scalar(0);  ///< [1] largest change of a velocity in the last sweep / largest approach
   Scalar restitutionLoss = Scalar(0);  ///< [J] energy taken by normal impulses
   Scalar frictionLoss = Scalar(0);     ///< [J] energy taken by tangential impulses

@@ -129,7 +129,7 @@ class ImpactPast {
   /// It does not bounce any more.
   template <class Scene>
   bool bouncesNoMore(const Scene& scene, std::uint32_t body) const {
-    return histories_.of(body).spent >= scene.settings.mostPerBody;
+    return histories_.of(body).spent >= S(scene.settings.mostPerBody);
   }
   /// It is left to the solver of simultaneous contacts.
   template <class Scene>

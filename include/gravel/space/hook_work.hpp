@@ -49,10 +49,11 @@ class HookWork {
     byWay_ = free;
   }
 
-  /// Around what moves bodies. \param time [s] that it takes
+  /// Before what moves bodies.
   void depart(const Bodies& bodies) {
     parallelFor(bodies.size(), detail::bodyGrain, [&](std::size_t i) { places_[i] = bodies[i].position(); });
   }
+  /// After it. \param time [s] that it takes
   void arrive(const Bodies& bodies, const Scalar& time) {
     late_ = time_ / Scalar(2);
     parallelFor(bodies.size(), detail::bodyGrain, [&](std::size_t i) {

@@ -33,7 +33,6 @@ class SleepStage {
   using Config = SimulationConfig<Scalar>;
 
   bool empty() const { return islands_.empty(); }
-  const std::vector<SleepingIsland<Scalar>>& islands() const { return islands_; }
 
   /// All wake before the next step.
   void wakeAll() {

@@ -8,7 +8,7 @@
 
 namespace gravel {
 
-/// A body as it was when its island came to rest; any other value of it means that somebody changed it.
+/// A body as it was when its island came to rest; another value of it wakes it.
 template <Real Scalar>
 struct RestingBody {
   std::uint64_t id;
@@ -32,7 +32,7 @@ struct RestingBody {
             static_cast<std::uint32_t>(body.index())};
   }
 
-  /// Whether nobody moved it, gave it speed, or made another body of it.
+  /// Whether nobody moved it or made another body of it.
   template <class Proxy>
   bool holds(const Proxy& body) const {
     return position == Vector3<Scalar>(body.position()) && mass == Scalar(body.mass()) &&

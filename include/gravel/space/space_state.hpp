@@ -281,6 +281,7 @@ void Space<Scalar, Layout>::restore(const std::string& path) requires std::is_tr
   colors_.clear();
   dt_ = numbers.dt;
   previous_dt_ = numbers.previous_dt;
+  parts_ = 1;
   time_ = numbers.time;
   timeRest_ = numbers.timeRest;
   lastTotalEnergy_ = numbers.lastTotalEnergy;
