@@ -2,9 +2,8 @@
 //
 //   ns_per_candidate              narrow phase: time / candidate pairs within a tenth of a radius
 //   ns_per_contact                colouring, and solving of lone pairs: time / contacts
-//   ns_per_contact_and_iteration  solver and correction of positions: time / (contacts x sweeps), gathering
-//   of
-//                                 bodies and booking of energy included
+//   ns_per_contact_and_iteration  solver and correction of positions: time / (contacts x sweeps), with the
+//                                 gathering of bodies and the booking of energy
 //   residual                      largest change of a velocity in the last sweep / largest approach
 //   floor_error                   |impulse on the floor / weight x dt - 1|: what a solve from nothing has
 //                                 carried down through the packing after so many sweeps

@@ -1,8 +1,7 @@
 // Direct gravity: nanoseconds per ordered pair, with the error beside it.
 //
-//   ns_per_pair  time of one evaluation / N^2 (processor time of the driving thread: run with
-//   OMP_NUM_THREADS=1) rms_error    rms of |a - a_exact| / |a_exact| over 64 bodies, against a sum in long
-//   double
+//   ns_per_pair  processor time of one evaluation, of all threads, / N^2
+//   rms_error    rms of |a - a_exact| / |a_exact| over 64 bodies, against a sum in long double
 //
 // Compare rows of one run only, and medians (--benchmark_repetitions=5
 // --benchmark_enable_random_interleaving=true).

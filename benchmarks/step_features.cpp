@@ -13,7 +13,7 @@ using namespace gravel;
 
 enum class Use { Absent, Unneeded, Needed };
 
-/// 4096 spheres at random in a cube, 1 % of it filled, moving slowly; no gravity.
+/// 4096 spheres on a lattice, 1 % of it filled, that move slowly to all sides; no gravity.
 Space<double> dilute(const SimulationConfig<double>& chosen) {
   SimulationConfig<double> config = chosen;
   config.timeStep = 1e-3;

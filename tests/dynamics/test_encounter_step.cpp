@@ -274,9 +274,9 @@ struct CountedRate {
   }
 };
 
-// Seen to fail: bodies in the order of the curve through the cube around all (8.0e6 pairs).
+// Seen to fail: bodies in the order of the curve through the cube around all (8.0e6 pairs of 4000).
 TEST_CASE("One body far away does not make the search for the fastest pair one through all pairs") {
-  const std::size_t n = 4000;
+  const std::size_t n = 1500;
   auto bodies = made(scenes::plummerSphere<double>(n, 1));
   bodies[0].mass() *= 100;
   for (const double far : {1.0, 1e6, 1e9, 1e30}) {
@@ -284,14 +284,14 @@ TEST_CASE("One body far away does not make the search for the fastest pair one t
     std::atomic<std::size_t> pairs{0};
     const detail::EncounterRate<double> rate{1.0, 1.0, 0.0};
     const double most = detail::LargestPairRate<double>(bodies).of(CountedRate{rate, &pairs}, 1e300);
+    std::vector<detail::PairMember<double>> members;
+    for (std::size_t i = 0; i < n; ++i) {
+      members.push_back({bodies[i].position(), bodies[i].velocity(), 0, bodies[i].mass(), true});
+    }
     double expected = 0;
-    const auto member = [&](std::size_t i) {
-      return detail::PairMember<double>{bodies[i].position(), bodies[i].velocity(), 0, bodies[i].mass(),
-                                        true};
-    };
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t j = i + 1; j < n; ++j) {
-        expected = std::max(expected, rate.of(member(i), member(j)));
+        expected = std::max(expected, rate.of(members[i], members[j]));
       }
     }
     CAPTURE(far);

@@ -76,7 +76,7 @@ Vector3<Scalar> scaledUnit(const Vector3<Scalar>& v) {
   return scaled / std::sqrt(scaled.squaredNorm());
 }
 
-/// v / length for length = |v|; v itself where it is zero or not finite.
+/// v / length for length = |v|; v itself where it is zero or NaN, NaN where it is infinite.
 template <Real Scalar>
 [[gnu::always_inline]] inline Vector3<Scalar> safeUnit(const Vector3<Scalar>& v, const Scalar& length) {
   if (!(length > Scalar(0))) {

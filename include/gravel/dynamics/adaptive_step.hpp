@@ -67,7 +67,8 @@ struct FlowLeftOut {
 
 }  // namespace detail
 
-/// The step by the rules above over the movable bodies, within the limits. O(N).
+/// [s] The step by the rules above over the movable bodies, within the limits. O(N).
+/// \param softening [m]
 /// \param anchored something outside the bodies stands still, such as a plane
 /// \throws std::invalid_argument of validate()
 template <Real Scalar, class Layout>

@@ -30,7 +30,8 @@ inline void addCompensated(Vector3<Scalar>& sum, Vector3<Scalar>& low, const Vec
 
 /// The lost parts of the positions and velocities of all bodies. A body whose position or velocity is not
 /// what the integrator last wrote (a contact, damping, a user's own hand, another order of the bodies) begins
-/// anew, with no lost part. 96 bytes a body in double. For scalars that are not built in nothing is carried.
+/// anew, with no lost part. 96 bytes a body in double. For scalars that are not built in integrate()
+/// carries nothing.
 template <Real Scalar>
 class Compensation {
  public:

@@ -252,10 +252,10 @@ Scalar stepFromEncounters(const Bodies<Scalar, Layout>& bodies, const Scalar& G,
   return std::min<Scalar>(std::max<Scalar>(Scalar(h), least), limits.largest);
 }
 
-/// The step after one of length `last`, where the state between them asks for `wanted`: the two steps' mean
-/// rate is the rate wanted, 1/next + 1/last = 2/wanted (Huang & Leimkuhler 1997, SIAM J. Sci. Comput. 18,
-/// 239). From the state after it, backwards, the same rule gives `last`: the map is as reversible as a fixed
-/// step, and its energy does not drift. Where `last` was far from `wanted`, it is `wanted`.
+/// [s] The step after one of length `last`, where the state between them asks for `wanted`: the two steps'
+/// mean rate is the rate wanted, 1/next + 1/last = 2/wanted (Huang & Leimkuhler 1997, SIAM J. Sci. Comput.
+/// 18, 239). From the state after it, backwards, the same rule gives `last`: the map is as reversible as a
+/// fixed step, and its energy does not drift. Where `last` was far from `wanted`, it is `wanted`.
 template <Real Scalar>
 Scalar reversibleStep(const Scalar& last, const Scalar& wanted) {
   // 2/3 … 2 of the step wanted, a range that the rule maps on itself.

@@ -35,7 +35,7 @@ class FewPoints {
     std::size_t size_, stride_;
   };
 
-  /// \param lost  of these bodies, or nullptr: nothing is carried. Both must outlive this object's use
+  /// \param lost  of these bodies, or nullptr: nothing is carried. store() wants the same two
   template <class Layout>
   void load(const Bodies<Scalar, Layout>& bodies, Compensation<Scalar>* lost) {
     n_ = bodies.size();

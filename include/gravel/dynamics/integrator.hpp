@@ -135,11 +135,13 @@ struct NoDeparture {
   void operator()(const Scalar&) const {}
 };
 
-/// Advances all bodies by one step h. Accelerations must be those of the present positions, and are at the
-/// end.
-/// \throws std::invalid_argument for a kind whose traits have no stages, or a step that is not finite
-/// \param forces  called with the part of h that has passed [s]: accelerations at the present positions; as
+/// Advances all bodies by one step h [s]. Accelerations must be those of the present positions, and are at
+/// the end. \throws std::invalid_argument for a kind whose traits have no stages, or a step that is not
+/// finite \param forces  called with the part of h that has passed [s]: accelerations at the present
+/// positions; as
 ///   often as the traits' forceEvaluations say
+/// \param departure  if it holds, called once with the time of the first kick [s], after it and before the
+///   first drift; it may change velocities and spins
 /// \param arrival  called once, when positions are final and the last forces are not yet evaluated
 /// \param lost  carries what sums lose to rounding from step to step; nullptr: nothing is carried
 /// Cost: the force evaluations and, for s stages, s + 1 passes over the bodies. Bits do not depend on the

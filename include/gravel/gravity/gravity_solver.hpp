@@ -43,7 +43,8 @@ class GravitySolver {
   }
 
   /// The method for that many bodies, never `Automatic`. A function of the number, of the tolerance, of the
-  /// kind of domain and of the scalar alone: a run that is taken up again takes it again.
+  /// kind of domain, of the scalar and of the width of the lanes that the target has: a run that is taken up
+  /// again by the same program takes it again.
   GravityKind choice(std::size_t bodies) const {
     if (kind_ != GravityKind::Automatic) {
       return kind_;

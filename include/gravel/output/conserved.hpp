@@ -10,10 +10,11 @@ namespace gravel {
 
 template <Real Scalar>
 struct ConservedQuantities {
-  Scalar mass = Scalar(0);                                    ///< [kg]
-  Vector3<Scalar> momentum = Vector3<Scalar>::Zero();         ///< [kg m s^-1]
-  Vector3<Scalar> angularMomentum = Vector3<Scalar>::Zero();  ///< orbit and spin, about the origin
-  Vector3<Scalar> centreOfMass = Vector3<Scalar>::Zero();     ///< [m]; the origin if there is no mass
+  Scalar mass = Scalar(0);                             ///< [kg]
+  Vector3<Scalar> momentum = Vector3<Scalar>::Zero();  ///< [kg m s^-1]
+  Vector3<Scalar> angularMomentum =
+      Vector3<Scalar>::Zero();                             ///< [kg m^2 s^-1] orbit and spin, about the origin
+  Vector3<Scalar> centreOfMass = Vector3<Scalar>::Zero();  ///< [m]; the origin if there is no mass
 };
 
 /// O(N); the same bits for any number of threads.
