@@ -129,7 +129,7 @@ template <class B>
 
 /// False for a tracer, and for two immovable bodies.
 template <class B>
-bool canTouch(const B& bodies, std::size_t i, std::size_t j) {
+[[gnu::always_inline]] inline bool canTouch(const B& bodies, std::size_t i, std::size_t j) {
   return !isTracer(bodies, i) && !isTracer(bodies, j) && (isMovable(bodies, i) || isMovable(bodies, j));
 }
 

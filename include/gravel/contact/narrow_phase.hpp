@@ -230,8 +230,7 @@ class NarrowPhase {
     if (!(reach > S(0)) || (!overlaps && !(distance < reach + detail::marginOf(settings, reach, falls)))) {
       return false;
     }
-    if (detail::isTracer(bodies, i) || detail::isTracer(bodies, j) ||
-        !(detail::isMovable(bodies, i) || detail::isMovable(bodies, j))) {
+    if (!detail::canTouch(bodies, i, j)) {
       return false;
     }
     const auto mayBegin = [&] {

@@ -94,15 +94,12 @@ std::size_t Space<Scalar, Layout>::chooseParts(const Scalar& h) {
   };
   Scalar rate_sq(0);
   for (const Contact<Scalar>& c : contacts()) {
-    const bool boundary = c.second == staticPartner;
+    const Scalar r = detail::smallerRadius(c, bodies_);
     Vector v = contacts().drift(c) - detail::velocityOf(bodies_, c.first);
     Vector a = -accelerationOf(c.first);
-    Scalar r = bodies_.radii()[c.first];
-    if (!boundary) {
+    if (c.second != staticPartner) {
       v += detail::velocityOf(bodies_, c.second);
       a += accelerationOf(c.second);
-      const Scalar r2 = bodies_.radii()[c.second];
-      r = r2 > Scalar(0) && (r2 < r || !(r > Scalar(0))) ? r2 : r;
     }
     rate_sq = std::max<Scalar>(rate_sq, v.squaredNorm() / (r * r));
     rate_sq = std::max<Scalar>(rate_sq, Scalar(2) * Scalar(sqrt(a.squaredNorm())) / r);
