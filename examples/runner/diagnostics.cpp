@@ -30,6 +30,11 @@ double liftEnergy(const Space<double>& space) {
   return sum;
 }
 
+bool arePlacesFinite(const Space<double>& space) {
+  return std::all_of(space.bodies().begin(), space.bodies().end(),
+                     [](const auto& body) { return body.position().allFinite(); });
+}
+
 /// Motion and |potential|, but no more motion than the ledger knows a source of: where energy came from
 /// nothing it is measured against what there was without it.
 double energyInPlay(const EnergyLedger<double>& first, const EnergyLedger<double>& now) {
@@ -52,7 +57,7 @@ void Diagnostics::record(const Space<double>& space) {
   }
   h.last = e;
   see(e.kinetic + e.rotational);
-  h.isFinite = h.isFinite && std::isfinite(e.total());
+  h.isFinite = h.isFinite && std::isfinite(e.total()) && arePlacesFinite(space);
   h.inPlay = std::max(h.inPlay, energyInPlay(h.first, e));
   h.worstDrift = std::max(h.worstDrift, std::abs(h.drift()));
   ++h.rows;

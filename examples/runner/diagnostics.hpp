@@ -16,7 +16,7 @@ struct History {
   double inPlay = 0.0;  ///< most energy in play of all rows: the scale of the drift
   double worstDrift = 0.0;
   double peakMotion = 0.0;       ///< most kinetic + rotational energy of all steps, not of the rows alone
-  bool isFinite = true;          ///< the energies were, in every step
+  bool isFinite = true;          ///< the energies were, in every step, and the places in every row
   bool closes = true;            ///< the ledger: that of a patch lacks what its shear does by gravity
   std::size_t mostContacts = 0;  ///< of all steps, too
   std::size_t rows = 0;

@@ -160,8 +160,8 @@ void prepareFile(const fs::path& file) {
   }
 }
 
-/// Saves the state, but for one whose energies are not finite: from that no run can go on, and what an
-/// earlier one saved stays.
+/// Saves the state, but for one that is not finite: from that no run can go on, and what an earlier one saved
+/// stays.
 /// \return the reason if it could not be written: the rest of the output is to come all the same
 std::string saveFailure(const Space<double>& space, const std::string& file, bool isFinite) {
   try {

@@ -16,10 +16,10 @@ struct RunFacts {
   int threads = 1;
 };
 
-/// Said where the energies were not finite in some step; then the run counts as failed.
+/// Said where energies were not finite in some step, or places in some row; then the run counts as failed.
 inline constexpr const char* notFinite =
-    "The energies are not finite: this run is not to be trusted. Take a shorter timeStep, or smaller "
-    "numbers.";
+    "The energies or places are not finite: this run is not to be trusted. Take a shorter timeStep, or "
+    "smaller numbers.";
 
 /// A few sentences, each a line.
 std::string summary(const Scene& scene, const Space<double>& space, const History& history,

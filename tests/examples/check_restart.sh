@@ -168,7 +168,7 @@ refuses 1 "cannot save to $long: File name too long" ball --save "$long"
 echo mine >"$folder/mine.gravel.part"
 go ball mine || exit 1
 [ "$(cat "$folder/mine.gravel.part")" = mine ] || { echo "saving touched a file of another name"; exit 1; }
-refuses 1 "energies are not finite" not_finite --save "$folder/not_finite.gravel"
+refuses 1 "energies or places are not finite" not_finite --save "$folder/not_finite.gravel"
 [ ! -e "$folder/not_finite.gravel" ] || { echo "energies that are not finite were saved"; exit 1; }
 [ -e /dev/full ] || exit 0
 rm "$folder/refused/summary.txt"
