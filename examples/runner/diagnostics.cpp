@@ -323,7 +323,9 @@ std::optional<std::size_t> centreOf(const Space<double>& space, std::size_t i, s
   for (std::size_t j = 0; j < space.n(); ++j) {
     inside += j != i && j != centre && distance(space, j, centre) < reach ? space.body(j).mass() : 0.0;
   }
-  const bool isOfTwo = inside <= 0.01 * space.body(centre).mass() && space.config().softening <= 0.01 * reach;
+  const double mass = space.body(centre).mass();
+  const bool pulls = mass > 0.0 && reach > 0.0;
+  const bool isOfTwo = pulls && inside <= 0.01 * mass && space.config().softening <= 0.01 * reach;
   return isOfTwo ? std::optional(centre) : std::nullopt;
 }
 

@@ -98,9 +98,9 @@ struct Orbit {
 Orbit orbitAbout(const Space<double>& space, std::size_t i, std::size_t centre);
 
 /// The body that holds body i, `heaviest` being the heaviest of all: of the heavier ones in whose Hill sphere
-/// it is the one to which it is bound most tightly, else `heaviest`. Nothing where no ellipse of two bodies
-/// describes it: others of more than a hundredth of that body's mass are nearer to it than i, or gravity is
-/// softened at that distance.
+/// it is the one to which it is bound most tightly, else `heaviest`. Nothing where no conic of two bodies
+/// describes it: that body has no mass or is where i is, others of more than a hundredth of its mass are
+/// nearer to it than i, or gravity is softened at that distance.
 std::optional<std::size_t> centreOf(const Space<double>& space, std::size_t i, std::size_t heaviest);
 
 }  // namespace gravel::runner

@@ -83,3 +83,8 @@ says(two_points "semi-major axis" "simulation = {G = 1}\n${pair}")
 says_nothing(softened "semi-major axis" "simulation = {G = 1, softening = 1}\n${pair}")
 says_nothing(in_a_field "semi-major axis" "simulation = {G = 1}\nfield = {acceleration = [0, 0, -1]}\n${pair}")
 says_nothing(over_a_floor "semi-major axis" "simulation = {G = 1}\n[[plane]]\noffset = -1\n${pair}")
+# Seen to fail: both fly past.
+says_nothing(massless "Orbits" "simulation = {G = 1}
+body = [{mass = 0}, {position = [1, 0, 0], velocity = [0, 1, 0], mass = 0}]
+")
+says_nothing(at_one_place "Orbits" "simulation = {G = 1}\nbody = [{mass = 1}, {mass = 1}]\n")
