@@ -53,9 +53,11 @@ void Diagnostics::record(const Space<double>& space) {
   if (h.rows == 0) {
     h.first = e;
     h.inPlay = liftEnergy(space);
+    h.begin = h.restsSince = space.time();
     h.closes = space.getG() == 0.0 || space.domain().shearSpeed() == 0.0;
   }
   h.last = e;
+  h.end = space.time();
   see(e.kinetic + e.rotational);
   h.isFinite = h.isFinite && std::isfinite(e.total()) && arePlacesFinite(space);
   h.inPlay = std::max(h.inPlay, energyInPlay(h.first, e));
@@ -79,7 +81,9 @@ void Diagnostics::count(const Space<double>& space) {
   h.mostParts = std::max(h.mostParts, space.contactSubsteps());
   EnergyLedger<double> now;
   addKineticEnergy(space.bodies(), now);
-  see(now.kinetic + now.rotational);
+  const double motion = now.kinetic + now.rotational;
+  see(motion);
+  h.restsSince = motion < History::restShare * h.peakMotion ? h.restsSince : space.time();
 }
 
 void Diagnostics::see(double motion) {

@@ -23,6 +23,16 @@ struct History {
   std::size_t steps = 0;  ///< that were counted
   std::size_t parts = 0;  ///< of these, each with its own contacts
   std::size_t mostParts = 0;
+  double begin = 0.0, end = 0.0;  ///< times of the first and of the last row
+  double restsSince = 0.0;        ///< when motion was last more than the share at rest, of all steps
+
+  /// Share of the most motion seen that is left at rest, at most.
+  static constexpr double restShare = 1e-4;
+  /// Little motion is rest where it has been so for a tenth of the time and losses, not a potential, took
+  /// what there was: a ball at the top of its way and a comet far out move little, too.
+  bool isAtRest() const {
+    return end - restsSince >= 0.1 * (end - begin) && taken().dissipated() >= 0.5 * peakMotion;
+  }
 
   /// What was taken since the first row, term by term. The ledger counts from the start of the scene: that of
   /// a run that is taken up holds what the earlier part lost.

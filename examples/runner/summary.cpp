@@ -162,8 +162,8 @@ void addEnergy(std::string& text, const History& h) {
                    h.peakMotion / h.inPlay);
   } else if (h.peakMotion > 0.0) {
     const double left = motion / h.peakMotion;
-    text += format(left < 1e-4 ? "All has come to rest: %.1e of the most kinetic energy seen is left.\n"
-                               : "%.2g of the most kinetic energy seen is left.\n",
+    text += format(h.isAtRest() ? "All has come to rest: %.1e of the most kinetic energy seen is left.\n"
+                                : "%.2g of the most kinetic energy seen is left.\n",
                    left);
   }
   text +=
