@@ -421,9 +421,10 @@ int main(int argc, char** argv) {
   app.add_option("--duration", options.duration, "time to simulate, in place of the scene's own")
       ->check([](const std::string& text) {
         double time = 0.0;
-        return CLI::detail::lexical_cast(text, time) && time > 0.0 && std::isfinite(time)
+        const detail::Range<double> positive = detail::positive<double>();
+        return CLI::detail::lexical_cast(text, time) && positive.contains(time)
                    ? std::string()
-                   : "is " + text + "; allowed: a finite number > 0";
+                   : "is " + text + "; allowed: a number, " + positive.allowed(time);
       });
   app.add_option("--frames", options.frames,
                  "number of frames for ParaView, in place of the scene's own; 0: none")
