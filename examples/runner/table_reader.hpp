@@ -81,6 +81,9 @@ inline std::string allowedNames(std::string_view wrong, const std::vector<std::s
       likely = name;
     }
   }
+  if (names.empty()) {
+    return "; but there is none at all";
+  }
   std::string text = likely.empty() ? "; allowed: " : "; did you mean \"" + likely + "\"? allowed: ";
   for (std::size_t i = 0; i < names.size(); ++i) {
     text += (i == 0 ? "" : ", ") + names[i];
