@@ -209,23 +209,25 @@ class Schedule {
       : count_(times),
         duration_(duration),
         interval_(times > 1 ? duration / static_cast<double>(times - 1) : duration) {}
-  bool isDue(double time) {
-    if (next_ >= count_ || time < at(next_)) {
+  /// \param step  that ended at that time; a millionth of it is rounding in the sum of steps
+  bool isDue(double time, double step) {
+    const double early = 1e-6 * step;
+    if (next_ >= count_ || time < at(next_, early)) {
       return false;
     }
     // By division: a count one by one would not end where there are far more times than steps.
-    const double passed = std::floor(time / interval_);
-    next_ = passed < static_cast<double>(count_) ? std::max(next_, static_cast<std::size_t>(passed)) : count_;
-    while (next_ < count_ && time >= at(next_)) {  // that one itself, and what the quotient lost to rounding
+    const double passed = std::floor((time + early) / interval_), last = static_cast<double>(count_ - 1);
+    next_ = std::max(next_, passed < last ? static_cast<std::size_t>(passed) : count_ - 1);
+    while (next_ < count_ && time >= at(next_, early)) {  // that one, and what the quotient lost to rounding
       ++next_;
     }
     return true;
   }
 
  private:
-  /// The last one is the end itself, which a product may pass by rounding.
-  double at(std::size_t number) const {
-    return number > 0 && number + 1 == count_ ? duration_ : static_cast<double>(number) * interval_;
+  /// The last one is the end itself, which a product may pass by rounding, and nothing is that early.
+  double at(std::size_t number, double early) const {
+    return number > 0 && number + 1 == count_ ? duration_ : static_cast<double>(number) * interval_ - early;
   }
 
   std::size_t count_, next_ = 0;
@@ -327,13 +329,13 @@ int run(const Options& options) {
 
   // A stop has its row and its frame, as the end has, whether they are due or not.
   const auto observe = [&](bool isStop) {
-    if (rows.isDue(space.time()) || isStop) {
+    if (rows.isDue(space.time(), space.getPreviousTimeStep()) || isStop) {
       diagnostics.record(space);
     }
-    if (frames.isDue(space.time()) || (isStop && series)) {
+    if (frames.isDue(space.time(), space.getPreviousTimeStep()) || (isStop && series)) {
       series->write(vtkPoints(space.bodies()), space.time());
     }
-    if (marks.isDue(space.time())) {
+    if (marks.isDue(space.time(), space.getPreviousTimeStep())) {
       for (const auto body : space.bodies()) {
         addToTrail(trails[toInteger(body.id())], body.position(), space.domain());
       }
