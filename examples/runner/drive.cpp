@@ -14,6 +14,11 @@ Vector3<double> velocityOf(const ScenePlane& plane, double time, double h) {
 
 }  // namespace
 
+Vector3<double> fieldAt(const Scene& scene, double time) {
+  const double turns = scene.fieldTurn.norm();
+  return turns > 0.0 ? Eigen::AngleAxisd(turns * time, scene.fieldTurn / turns) * scene.field : scene.field;
+}
+
 void drive(Space<double>& space, const Scene& scene, double h) {
   const double time = space.time();
   for (std::size_t k = 0; k < scene.planes.size(); ++k) {
@@ -21,13 +26,9 @@ void drive(Space<double>& space, const Scene& scene, double h) {
       space.setPlaneVelocity(k, velocityOf(scene.planes[k], time, h));
     }
   }
-  const double turns = scene.fieldTurn.norm();
-  if (turns > 0.0) {  // that of the middle stands for the step
-    const Eigen::AngleAxisd turn(turns * (time + 0.5 * h), scene.fieldTurn / turns);
-    const Vector3<double> field = turn * scene.field;
-    if (field != space.uniformField()) {  // as it is where the run has just begun
-      space.setUniformField(field);
-    }
+  const Vector3<double> field = fieldAt(scene, time + 0.5 * h);  // that of the middle stands for the step
+  if (field != space.uniformField()) {                           // as it is where the run has just begun
+    space.setUniformField(field);
   }
 }
 

@@ -1,3 +1,4 @@
+#include "drive.hpp"
 #include "restart.hpp"
 #include "text.hpp"
 
@@ -34,16 +35,23 @@ bool areAlike(const Space<double>& a, const Space<double>& b, std::size_t i) {
          a.body(i).isFixed() == b.body(i).isFixed() && a.body(i).material() == b.body(i).material();
 }
 
-/// How far rounding may have brought a plane from where it should be. Each step adds a way, and of one that
-/// shakes a difference of two swings, whose phases are off by their last digits: those of a long time.
-double offByRounding(const ScenePlane& plane, double size, const Space<double>& saved) {
-  const double phase = plane.shakes() ? plane.omega() * saved.time() : 0.0;
-  return 1e-9 * size + std::numeric_limits<double>::epsilon() * static_cast<double>(saved.steps()) *
-                           (size + phase * plane.shake.norm());
+/// How far rounding may have brought a number of that size from what it should be. Each step adds a way, and
+/// of what swings or turns by `range` a difference of two phases, which are off by their last digits: those
+/// of a long time.
+double offByRounding(double size, double phase, double range, const Space<double>& saved) {
+  return 1e-9 * size +
+         std::numeric_limits<double>::epsilon() * static_cast<double>(saved.steps()) * (size + phase * range);
 }
 
-/// The same surfaces, where the scene's way has brought them; one that shakes has another velocity in each
-/// step.
+/// A plane that shakes has another velocity in each step: across its normal that of the step's end.
+bool isOfShake(const ScenePlane& plane, const Vector3<double>& velocity, const Space<double>& saved) {
+  const double omega = plane.omega(), phase = omega * saved.time(), speed = omega * plane.shake.norm();
+  const Vector3<double> off = plane.velocity + omega * std::cos(phase) * plane.shake - velocity;
+  return (off - plane.normal.dot(off) * plane.normal).norm() <=
+         offByRounding(plane.velocity.norm() + speed, phase, speed, saved);
+}
+
+/// The same surfaces, where the scene's way has brought them.
 bool areAlike(const Space<double>& a, const Plane<double>& ofA, const Space<double>& b,
               const Plane<double>& ofB, const ScenePlane& plane) {
   const double time = b.time();
@@ -52,8 +60,11 @@ bool areAlike(const Space<double>& a, const Plane<double>& ofA, const Space<doub
     way += plane.swing(time) * plane.shake;
   }
   const double size = std::abs(ofA.offset) + time * plane.velocity.norm() + plane.shake.norm();
-  return ofA.normal == ofB.normal && (plane.shakes() || ofA.velocity == ofB.velocity) &&
-         std::abs(ofA.offset + ofA.normal.dot(way) - ofB.offset) <= offByRounding(plane, size, b) &&
+  const double phase = plane.shakes() ? plane.omega() * time : 0.0;
+  return ofA.normal == ofB.normal &&
+         (plane.shakes() ? isOfShake(plane, ofB.velocity, b) : ofA.velocity == ofB.velocity) &&
+         std::abs(ofA.offset + ofA.normal.dot(way) - ofB.offset) <=
+             offByRounding(size, phase, plane.shake.norm(), b) &&
          ofA.material == ofB.material && a.material(ofA.material) == b.material(ofB.material);
 }
 
@@ -101,18 +112,23 @@ std::string misfitOfSettings(const Scene&, const Space<double>& start, const Spa
   return {};
 }
 
-/// A field that turns keeps its size and its part along the axis.
-bool isOfField(const Scene& scene, const Vector3<double>& field) {
+/// A field that turns keeps its size and its part along the axis, and is, but for a part of a step, where it
+/// has turned to.
+bool isOfField(const Scene& scene, const Space<double>& saved) {
   const Vector3<double>& start = scene.field;
   const Vector3<double>& turn = scene.fieldTurn;
+  const Vector3<double> field = saved.uniformField();
+  const double size = start.norm(), step = turn.norm() * scene.config.timeStep;
   return turn == Vector3<double>::Zero()
              ? field == start
-             : std::abs(field.norm() - start.norm()) <= 1e-9 * start.norm() &&
-                   std::abs(turn.dot(field - start)) <= 1e-9 * turn.norm() * start.norm();
+             : std::abs(field.norm() - size) <= 1e-9 * size &&
+                   std::abs(turn.dot(field - start)) <= 1e-9 * turn.norm() * size &&
+                   (field - fieldAt(scene, saved.time())).norm() <=
+                       step * size + offByRounding(size, turn.norm() * saved.time(), size, saved);
 }
 
 std::string misfitOfSurroundings(const Scene& scene, const Space<double>& start, const Space<double>& saved) {
-  if (!(saved.domain() == start.domain()) || !isOfField(scene, saved.uniformField()) ||
+  if (!(saved.domain() == start.domain()) || !isOfField(scene, saved) ||
       saved.planes().size() != start.planes().size()) {
     return "its domain, field or planes are not the scene's";
   }
