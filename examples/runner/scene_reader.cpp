@@ -8,6 +8,8 @@
 #include <fstream>
 #include <new>
 #include <sstream>
+#include <string>
+#include <unordered_set>
 
 namespace gravel::runner {
 
@@ -97,13 +99,13 @@ void requireRest(TableReader& reader, const Body<double>& body, bool flow) {
   }
 }
 
+/// \param names  of the bodies so far
 void readBody(TableReader& reader, const MaterialReader& materials, const Domain<double>& domain,
-              std::vector<SceneBody>& bodies) {
+              std::unordered_set<std::string>& names, std::vector<SceneBody>& bodies) {
   SceneBody entry;
   Body<double>& body = entry.body;
   reader.text("name", entry.name);
-  const auto hasThisName = [&](const SceneBody& other) { return other.name == entry.name; };
-  if (!entry.name.empty() && std::any_of(bodies.begin(), bodies.end(), hasThisName)) {
+  if (!entry.name.empty() && !names.insert(entry.name).second) {
     reader.fault("name", "\"" + entry.name + "\"", "a name that no other body has");
   }
   reader.vector("position", body.position);
@@ -433,7 +435,9 @@ Scene interpret(const toml::table& table, Faults& faults) {
   top.tables("box", [&](TableReader& reader) {
     enclosed = readBox(reader, scene.config, materials, scene.planes) || enclosed;
   });
-  top.tables("body", [&](TableReader& reader) { readBody(reader, materials, scene.domain, scene.bodies); });
+  std::unordered_set<std::string> names;
+  top.tables("body",
+             [&](TableReader& reader) { readBody(reader, materials, scene.domain, names, scene.bodies); });
   top.tables("cloud", [&](TableReader& reader) { readCloud(reader, materials, scene.domain, scene.bodies); });
   top.tables("column",
              [&](TableReader& reader) { readColumn(reader, materials, scene.domain, scene.bodies); });
