@@ -11,12 +11,12 @@ struct Step {
   const char* name;
 };
 
-/// The largest unit of which there is at least one; the smallest for less.
+/// The largest unit of which there is at least one, when rounded to three digits; the smallest for less.
 template <std::size_t N>
 std::string inUnit(double x, const std::array<Step, N>& steps) {
   const Step* best = &steps[0];
   for (const Step& step : steps) {
-    if (std::abs(x) >= step.size) {
+    if (std::abs(x) >= 0.9995 * step.size) {
       best = &step;
     }
   }
