@@ -57,9 +57,10 @@ class ContactStage {
   /// those of the last step are taken to rest, and, unless it `goesOn`, all that touch or approach slowly.
   void detect(const Bodies& bodies, const Config& config, const Scalar& time, const Scalar& h, bool goesOn,
               Profiler& profiler);
+  /// Before a step: contacts get the surfaces that settings, pairs and bodies have by now. O(bodies).
+  void renewSurfaces(const Bodies& bodies, const Config& config);
 
   // Of planes that move: contact_stage_planes.hpp.
-
   void setPlaneVelocity(std::size_t plane, const Vector3<Scalar>& velocity);
   /// The next solve sees planes as they move when a share (0 to 1) of the step of length h [s] has passed.
   void drivePlanes(const Bodies& bodies, const Scalar& share, const Scalar& h);
@@ -275,7 +276,6 @@ class ContactStage {
   std::span<const ContactName> names();
   /// Who came to rest in the step, sorted.
   std::span<const ContactKeys> settled();
-
   std::vector<HalfSpace<Scalar>> walls_;
   NeighbourList<Scalar> neighbours_;
   std::vector<std::uint32_t> fixed_;  // at its last search: it has no pairs of these

@@ -69,8 +69,37 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
   settings.leaning = leaning_;
   narrow_.find(neighbours_.pairs(), bodies, domain, materials.view(), walls_, settings, contacts_,
                nearBoundaries(bodies, Scalar(0)));
+  materials.note(bodies);
   carried_.clear();
   known_ = true;
+}
+
+/// What somebody changed between two steps acts from the start of the next one, and not from its middle on,
+/// where contacts are found again. O(contacts) then.
+template <Real Scalar, class Layout>
+void ContactStage<Scalar, Layout>::renewSurfaces(const Bodies& bodies, const Config& config) {
+  if (contacts_.empty() || materials.isAsNoted(bodies, config)) {
+    return;
+  }
+  materials.renewed(config);
+  materials.note(bodies);
+  bool changed = false;
+  for (Contact<Scalar>& c : contacts_) {
+    const std::uint32_t mine = bodies.materials()[c.first];
+    const std::uint32_t other =
+        c.second == staticPartner
+            ? static_cast<std::uint32_t>(boundaries.at(c.key2 - boundaryKey(0)).material)
+            : bodies.materials()[c.second];
+    ContactSurface<Scalar> surface = contacts_.surface(c);
+    surface.material = materials.view().pair(std::min(mine, other), std::max(mine, other));
+    if (!detail::equalIsSame<Scalar> || !(surface == contacts_.surface(c))) {
+      contacts_.setSurface(c, surface);
+      changed = true;
+    }
+  }
+  if (changed) {
+    contactsChanged();
+  }
 }
 
 /// What Hill's frame adds to accelerations, b(x, v) with a part B v that is linear in v. Before a drift of

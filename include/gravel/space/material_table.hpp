@@ -54,6 +54,7 @@ class MaterialTable {
     } else {
       pairs_.insert(place, entry);
     }
+    noted_ = false;
   }
 
   /// One of them, alone. \throws std::invalid_argument, if there is no such material
@@ -87,6 +88,29 @@ class MaterialTable {
       validate(entries[k], "material " + std::to_string(k));
     }
     entries_ = std::move(entries);
+    noted_ = false;
+  }
+
+  /// Contacts are being found with the surfaces of the last renewed(), and with what bodies are made of now.
+  /// O(bodies), where there are several materials.
+  template <class Layout>
+  void note(const Bodies<Scalar, Layout>& bodies) {
+    ofBodies_.clear();
+    for (std::size_t i = 0; entries_.size() > 1 && i < bodies.size(); ++i) {
+      ofBodies_.push_back(bodies.materials()[i]);
+    }
+    noted_ = true;
+  }
+
+  /// Whether nobody has changed a surface, or what a body is made of, since.
+  template <class Layout>
+  bool isAsNoted(const Bodies<Scalar, Layout>& bodies, const Config& config) const {
+    bool same = noted_ && detail::equalIsSame<Scalar> && entries_[0] == ownOf(config) &&
+                ofBodies_.size() == (entries_.size() > 1 ? bodies.size() : 0);
+    for (std::size_t i = 0; same && i < ofBodies_.size(); ++i) {
+      same = ofBodies_[i] == bodies.materials()[i];
+    }
+    return same;
   }
 
  private:
@@ -103,6 +127,8 @@ class MaterialTable {
 
   std::vector<Material<Scalar>> entries_ = std::vector<Material<Scalar>>(1);
   std::vector<MaterialPair<Scalar>> pairs_;  ///< in their order
+  std::vector<std::uint32_t> ofBodies_;      ///< at the last note()
+  bool noted_ = false;
 };
 
 }  // namespace gravel

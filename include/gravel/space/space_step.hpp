@@ -167,6 +167,7 @@ void Space<Scalar, Layout>::prepare(const Scalar& h) {
     const auto isOther = [&](BodyId id) { return std::binary_search(others.begin(), others.end(), id); };
     std::erase_if(decided, [&](const auto& pair) { return isOther(pair.first) || isOther(pair.second); });
   }
+  contact_.renewSurfaces(bodies_, this->config_);
   fallAsleep();
 }
 
