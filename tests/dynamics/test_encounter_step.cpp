@@ -439,6 +439,8 @@ TEST_CASE("No pair among many meets deeper than a quarter of the smaller radius,
     for (const Body<double>& body : list) {  // of equal masses
       v += moves(body) / static_cast<double>(list.size());
     }
+    const auto isFixed = [](const Body<double>& body) { return body.fixed; };
+    v = std::any_of(list.begin(), list.end(), isFixed) ? Vec(0, 0, 0) : v;
     double least = 1e300;
     for (const Body<double>& body : list) {
       if (body.radius > 0 && !body.fixed) {
@@ -466,6 +468,31 @@ TEST_CASE("No pair among many meets deeper than a quarter of the smaller radius,
   std::vector<Body<double>> points(200);
   points[0].velocity = {1, 0, 0};
   CHECK(stepFromEncounters(made(points), 1e-30, 0.0, StepLimits<double>{0.02, 0.0, 1.0}) == 1.0);
+}
+
+// A shoal of 200 spheres flies at a fixed one, 1 m before the first; another falls at 8 m s^-2, each as if to
+// a partner of its mass. Seen to fail: the fixed one as mass at rest in the mean, in whose frame the shoal
+// hardly moves (40 and 53 times the step).
+TEST_CASE("Many that move as one have the steps of one alone where something is fixed") {
+  std::vector<Body<double>> list(201);
+  list[0].fixed = true;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    list[i].mass = list[i].radius = 1;
+    list[i].velocity = {i > 0 ? 100.0 : 0.0, 0, 0};
+    list[i].position = {i > 0 ? -3.0 * static_cast<double>(i) : 0.0, 0, 0};
+  }
+  CHECK_THAT(stepFromEncounters(made(list), 1e-30, 0.0, wide), WithinRel((1 + 0.25) / 100, 1e-12));
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    list[i].radius = 0;
+  }
+  auto bodies = made(list);
+  for (std::size_t i = 1; i < list.size(); ++i) {
+    bodies[i].velocity() = Vec(0, 0, 0);
+    bodies[i].acceleration() = Vec(8, 0, 0);
+  }
+  const double s = 1 / 8.0;
+  CHECK_THAT(stepFromEncounters(bodies, 1.0, 0.0, wide),
+             WithinRel(0.02 * std::pow(2.0, 0.125) * std::pow(s, 0.75), 1e-12));
 }
 
 // Seen to fail: 1/next = 1.9/wanted - 0.9/last.

@@ -135,6 +135,7 @@ void lookAtLikeliest(const Bodies<Scalar, Layout>& bodies, const Domain<Scalar>&
   };
   S mass(0);
   std::size_t massive = 0;
+  bool anchored = false;  // by what is fixed, which makes rest absolute
   Vector3<S> v_cm = Vector3<S>::Zero();
   Vector3<S> a_cm = Vector3<S>::Zero();
   for (std::size_t i = 0; i < n; ++i) {
@@ -143,8 +144,11 @@ void lookAtLikeliest(const Bodies<Scalar, Layout>& bodies, const Domain<Scalar>&
     massive += m > S(0) ? 1U : 0U;
     v_cm += lessFlow(i, bodies[i].countingVelocity()) * m;
     a_cm += bodies.accelerations()[i].template cast<S>() * m;
+    anchored = anchored || bodies[i].isFixed();
   }
-  if (mass > S(0)) {
+  if (anchored) {
+    v_cm = a_cm = Vector3<S>::Zero();
+  } else if (mass > S(0)) {
     v_cm /= mass;
     a_cm /= mass;
   }
@@ -203,8 +207,8 @@ bool haveUnlikeMasses(const BodiesType& bodies) {
 /// The step by the rules above, within the limits and not below 1e-12 of the longest; nor does any pair meet
 /// deeper than a quarter of the smaller radius in a step. Up to `encounterPairs` bodies O(N^2), about as dear
 /// as their gravity. Above O(N), or O(N log N) where masses are unlike; there it is enough, too, if no sphere
-/// moves by more than a quarter of its radius, relative to the common centre of mass, and only where that
-/// asks for a shorter step pairs are searched, in O(N log N).
+/// moves by more than a quarter of its radius, relative to the common centre of mass (absolute where a body
+/// is fixed), and only where that asks for a shorter step pairs are searched, in O(N log N).
 ///
 /// \param domain unless open, pairs are nearest through images: above, the likeliest partner is meant for any
 ///        masses, and for any number no sphere moves by more than a quarter of its radius, the flow left out
