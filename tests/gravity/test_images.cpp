@@ -259,6 +259,14 @@ TEST_CASE("A long patch that leans gives the forces of its waves") {
   }
 }
 
+// Of a patch as long as is allowed the middle has 20 000 points on each side, and the next is outside. Seen
+// to fail, NaN, by which no such patch was deep: their square in int.
+TEST_CASE("The longest patch knows how far its middle reaches") {
+  for (const double length : {100.0, 8000.0, 1e4}) {
+    CHECK(detail::LatticeSums<double>::beyondMiddle({1, 0, 0}, {0, length, 0}) == 2 * length + 1);
+  }
+}
+
 // Seen to fail, all forces garbage, where such a body deepened the one expansion of all. The sheet of a patch
 // pulls with 2 pi M over the area; its waves have gone.
 TEST_CASE("A light body far above a patch leaves all others their forces, and falls to the sheet") {

@@ -107,7 +107,7 @@ class LatticeSums {
   static T beyondMiddle(const Vector3<T>& a, const Vector3<T>& b) {
     using std::sqrt;
     const int middle[2] = {middleOf(a, b), middleOf(b, a)};
-    T least_sq = T(9 * middle[0] * middle[0]) * a.squaredNorm();
+    T least_sq = Vector3<T>(T(3 * middle[0]) * a).squaredNorm();
     forHalf({2 * middle[0] + 1, 2 * middle[1] + 1, 0}, a, b, [&](const Point& p, const Vector3<T>& s) {
       if (std::abs(p[0]) > middle[0] || std::abs(p[1]) > middle[1]) {
         least_sq = std::min<T>(least_sq, s.squaredNorm());
