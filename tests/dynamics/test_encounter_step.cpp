@@ -1,4 +1,5 @@
 #include "scenes/scenes.hpp"
+#include "support/archetypes.hpp"
 #include "support/catch.hpp"
 #include <gravel/core/random.hpp>
 #include <gravel/dynamics/encounter_step.hpp>
@@ -163,6 +164,18 @@ TEST_CASE("Steps keep to their limits; points at one place, and none at all, ask
   CHECK_THAT(halved, WithinRel(alone, 0.1));
   point.mass = 0;
   CHECK(stepFromEncounters(made<double>({point, point}), 1.0, 0.0, limits) == 0.1);
+}
+
+// Seen to fail, NaN: 1e-100 as the least square of a distance.
+TEST_CASE("Tracers that are near each other ask for nothing, in a scalar of float's range either") {
+  using S = MinimalRealOf<float>;
+  std::vector<Body<S>> list(3);
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    list[i].position = {S(1e-9 * static_cast<double>(i)), S(0), S(0)};
+    list[i].velocity = {S(0), S(static_cast<double>(i)), S(0)};
+    list[i].mass = S(0);
+  }
+  CHECK(stepFromEncounters(made(list), S(1), S(0), StepLimits<S>{S(0.02), S(0), S(1)}) == S(1));
 }
 
 // Many bodies: each with the partner that its acceleration tells of. For a Plummer sphere that is within a

@@ -370,20 +370,23 @@ TEST_CASE("dual numbers: minus the slope of the energy is the force") {
   }
 }
 
-TEST_CASE("a scalar with no more than the concept asks for takes the plain loops") {
-  const auto plain = randomMasses<double>(30, 74);
-  PointMasses<MinimalReal> points;
+// Seen to fail, NaN in float's range: 1e-100 as the square below which two points are one.
+TEMPLATE_TEST_CASE("a scalar with no more than the concept asks for takes the plain loops", "", float,
+                   double) {
+  using S = MinimalRealOf<TestType>;
+  const auto plain = randomMasses<TestType>(30, 74);
+  PointMasses<S> points;
   for (std::size_t i = 0; i < plain.size(); ++i) {
-    const Vector3<double>& x = plain.positions[i];
-    points.positions.push_back({MinimalReal(x[0]), MinimalReal(x[1]), MinimalReal(x[2])});
-    points.masses.push_back(MinimalReal(i == 4 ? 0.0 : plain.masses[i]));
+    const Vector3<double> x = plain.positions[i].template cast<double>();
+    points.positions.push_back({S(x[0]), S(x[1]), S(x[2])});
+    points.masses.push_back(S(i == 4 ? 0.0 : static_cast<double>(plain.masses[i])));
   }
   auto expected = plain;
-  expected.masses[4] = 0.0;
-  const auto oracle = bruteGravity(expected.positions, expected.masses, 1.0, 0.0);
-  const auto a = accelerations(points, MinimalReal(1), MinimalReal(0));
+  expected.masses[4] = TestType(0);
+  const auto oracle = bruteGravity(expected.positions, expected.masses, TestType(1), TestType(0));
+  const auto a = accelerations(points, S(1), S(0));
   for (std::size_t i = 0; i < plain.size(); ++i) {
     const Vector3<long double> got(a[i][0].inTest(), a[i][1].inTest(), a[i][2].inTest());
-    CHECK((got - oracle.accelerations[i]).norm() <= errorBound<double>(30) * oracle.sumOfTerms[i]);
+    CHECK((got - oracle.accelerations[i]).norm() <= errorBound<TestType>(30) * oracle.sumOfTerms[i]);
   }
 }

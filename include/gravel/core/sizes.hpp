@@ -19,6 +19,19 @@ template <Real Scalar>
   }
 }
 
+/// 1e-100, or as much more as it takes for its cube to be in the scalar's range: 3e-13 in that of float.
+template <Real Scalar>
+Scalar leastWithCube() {
+  static const double least = [] {
+    double x = 1e-100;
+    while (!(Scalar(Scalar(x) * Scalar(x) * Scalar(x)) > Scalar(0))) {
+      x = std::sqrt(x);
+    }
+    return x;
+  }();
+  return Scalar(least);
+}
+
 /// Largest |coefficient|.
 template <Real Scalar>
 Scalar maxAbs(const Vector3<Scalar>& v) {

@@ -6,6 +6,7 @@
 
 #include <gravel/bodies/bodies.hpp>
 #include <gravel/core/parallel.hpp>
+#include <gravel/core/sizes.hpp>
 #include <gravel/spatial/morton.hpp>
 
 #include <algorithm>
@@ -24,10 +25,10 @@ struct PairMember {
   bool free;
 };
 
-/// [m^2] No distance counts as less, so that its sixth power stays in the range of double.
+/// [m^2] No distance counts as less, so that its sixth power stays in range.
 template <class S>
 S nearestSquared() {
-  return S(1e-100);
+  return leastWithCube<S>();
 }
 
 /// 0 where there is none.

@@ -4,6 +4,7 @@
 /// Newton's law for one pair of points, with Plummer's softening. Pure functions, for a scalar or for lanes.
 
 #include <gravel/core/lanes.hpp>
+#include <gravel/core/sizes.hpp>
 
 namespace gravel {
 
@@ -14,15 +15,16 @@ namespace gravel {
 template <Real S>
 struct PairLaw {
   /// Squared length, in units of the system's extent, below which two points count as one: distances of
-  /// 1e-100 in double, 1e-12 in float, 1e-50 in other types. Chosen so that s^(-3/2) stays in range, and for
-  /// dual numbers its square, by which the derivative of the quotient divides.
+  /// 1e-100 in double, 1e-12 in float, 1e-50 in other types, 6e-7 in those of float's range. Chosen so that
+  /// s^(-3/2) stays in range, and for dual numbers its square, by which the derivative of the quotient
+  /// divides.
   static S tiny() {
     if constexpr (std::is_same_v<S, float>) {
       return 1e-24F;
     } else if constexpr (std::is_floating_point_v<S>) {
       return S(1e-200L);
     } else {
-      return S(1e-100);
+      return detail::leastWithCube<S>();
     }
   }
 
