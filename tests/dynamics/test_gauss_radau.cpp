@@ -1,5 +1,6 @@
 #include "dynamics/problems.hpp"
 #include "scenes/scenes.hpp"
+#include "support/archetypes.hpp"
 #include "support/catch.hpp"
 #include <gravel/dynamics/gauss_radau.hpp>
 #include <gravel/gravity/direct_sum.hpp>
@@ -382,6 +383,21 @@ TEMPLATE_TEST_CASE("A star amid evenly spread planets does not stop the clock", 
       CHECK(stepsOf(bodies, S(10)) < 200);
     }
   }
+}
+
+// Seen to hang ("no end"): the difference between 1 and the next number taken as 0.
+TEMPLATE_TEST_CASE("A scalar that knows no limits does not stop the clock", "", float, double) {
+  using S = MinimalRealOf<TestType>;
+  std::vector<Body<S>> list(4);
+  for (int k = 0; k < 3; ++k) {  // amid them the star has no acceleration but rounding
+    const double angle = 2 * pi<double>() * k / 3;
+    list[static_cast<std::size_t>(k)].position = {S(std::cos(angle)), S(std::sin(angle)), S(0)};
+    list[static_cast<std::size_t>(k)].velocity = {S(-std::sin(angle)), S(std::cos(angle)), S(0)};
+    list[static_cast<std::size_t>(k)].mass = S(1e-6);
+  }
+  list[3].mass = S(1);
+  auto bodies = bodiesOf(list);
+  CHECK(stepsOf(bodies, S(10)) < 90);
 }
 
 // Between two bodies that go round, and that are fixed; in the middle and beside it. A tracer at rest there

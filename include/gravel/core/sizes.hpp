@@ -5,6 +5,8 @@
 
 #include <gravel/core/types.hpp>
 
+#include <algorithm>
+
 namespace gravel {
 
 namespace detail {
@@ -32,6 +34,23 @@ Scalar leastWithCube() {
   return Scalar(least);
 }
 
+/// The difference between 1 and the next number; found where a user's scalar has no numeric_limits.
+template <Real Scalar>
+Scalar roundoff() {
+  if constexpr (std::numeric_limits<Scalar>::is_specialized) {
+    return Scalar(std::numeric_limits<Scalar>::epsilon());
+  } else {
+    static const double least = [] {
+      double x = 1;
+      while (Scalar(Scalar(1) + Scalar(x / 2)) > Scalar(1)) {
+        x /= 2;
+      }
+      return x;
+    }();
+    return Scalar(least);
+  }
+}
+
 /// Largest |coefficient|.
 template <Real Scalar>
 Scalar maxAbs(const Vector3<Scalar>& v) {
@@ -41,6 +60,21 @@ Scalar maxAbs(const Vector3<Scalar>& v) {
     largest = size <= largest ? largest : size;  // keeps a NaN
   }
   return largest;
+}
+
+/// The same of an array of any length.
+template <class Derived>
+auto largestOf(const Eigen::ArrayBase<Derived>& a) {
+  using Scalar = typename Derived::Scalar;
+  if constexpr (std::is_floating_point_v<Scalar>) {
+    return Scalar(a.abs().maxCoeff());
+  } else {
+    Scalar largest(0);
+    for (Eigen::Index i = 0; i < a.size(); ++i) {
+      largest = std::max<Scalar>(largest, sizeOf<Scalar>(a.derived().coeff(i)));
+    }
+    return largest;
+  }
 }
 
 /// |x| + |y| + |z|, at least |v|.

@@ -4,6 +4,7 @@
 /// Gauss-Radau integration of order 15 with its own choice of step: gravity to machine precision.
 
 #include <gravel/core/check.hpp>
+#include <gravel/core/sizes.hpp>
 #include <gravel/dynamics/gauss_radau_state.hpp>
 #include <gravel/dynamics/gauss_radau_weights.hpp>
 #include <gravel/dynamics/integrator.hpp>
@@ -53,7 +54,7 @@ class GaussRadau15 {
   ///   jump, or grow without end. The bodies then stand where the last step left them
   template <class Layout, class Forces>
   void advance(Bodies<Scalar, Layout>& bodies, const Scalar& h, bool velocities, Forces&& forces) {
-    const Scalar eps = Eigen::NumTraits<Scalar>::epsilon();
+    const Scalar eps = detail::roundoff<Scalar>();
     begin(bodies);
     Scalar done(0);
     int stuck = 0;  // steps in a row that cannot be shorter
@@ -213,14 +214,14 @@ class GaussRadau15 {
         }
         forces(Scalar(done + s * dt));
         takeAccelerations(bodies, dv_);
-        size = std::max<Scalar>(size, dv_.abs().maxCoeff());
+        size = std::max<Scalar>(size, detail::largestOf(dv_));
         dx_ = dv_ - a0_;
-        change = std::max<Scalar>(change, (dx_ - F_[n]).abs().maxCoeff());
+        change = std::max<Scalar>(change, detail::largestOf(dx_ - F_[n]));
         F_[n] = dx_;
       }
       ++iterations_;
       // What is left is the change times the rate at which changes shrink.
-      const Scalar least = Eigen::NumTraits<Scalar>::epsilon() * size / Scalar(64);
+      const Scalar least = detail::roundoff<Scalar>() * size / Scalar(64);
       if (!(change > least) || (iteration > 1 && change / before <= least / change) ||
           (iteration > 2 && !(change < before))) {
         break;
@@ -240,16 +241,16 @@ class GaussRadau15 {
     const Scalar unit = largest > Scalar(0) ? largest : Scalar(1);  // in which fourth powers are in range
     const auto squared = [&](const auto& v) { return Scalar((v / unit).square().sum()); };
     const auto root = [](const Scalar& x) { return x > Scalar(0) ? Scalar(sqrt(x)) : Scalar(0); };
-    const Scalar eps = Eigen::NumTraits<Scalar>::epsilon();
+    const Scalar eps = detail::roundoff<Scalar>();
     const auto isRounding = [&](Eigen::Index at) {
       Scalar change(0);
       for (const Column& f : F_) {
-        change = std::max<Scalar>(change, f.template segment<3>(at).abs().maxCoeff());
+        change = std::max<Scalar>(change, detail::largestOf(f.template segment<3>(at)));
       }
       // Places at the start and at the last node.
       const Scalar now =
           detail::maxAbs<Scalar>(Vector3<Scalar>(bodies.positions()[static_cast<std::size_t>(at / 3)]));
-      const Scalar place = std::max<Scalar>(now, last_.x.template segment<3>(at).abs().maxCoeff());
+      const Scalar place = std::max<Scalar>(now, detail::largestOf(last_.x.template segment<3>(at)));
       return change <= Scalar(16) * eps * largest ||
              change * dt_sq <= eps * std::max<Scalar>(place, last_.fixedPlace);
     };

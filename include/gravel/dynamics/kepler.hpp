@@ -115,7 +115,7 @@ void keplerIncrements(const Vector3<Scalar>& x, const Vector3<Scalar>& v, const 
     (off > Scalar(0) ? high : low) = s;
     const Scalar next = s - off / r;
     const Scalar change = next - s;
-    const Scalar small = Scalar(2) * std::numeric_limits<Scalar>::epsilon() * (s < Scalar(0) ? -s : s);
+    const Scalar small = Scalar(2) * detail::roundoff<Scalar>() * (s < Scalar(0) ? -s : s);
     if ((change <= small && change >= -small) || !(high - low > Scalar(0))) {
       break;
     }

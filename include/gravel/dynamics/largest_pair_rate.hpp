@@ -206,7 +206,7 @@ class LargestPairRate {
       std::size_t number;
     };
     // Rounding of the bounds: what is found shall not depend on the order in which it is looked for.
-    const S safe = S(1) + S(64) * Eigen::NumTraits<S>::epsilon();
+    const S safe = S(1) + S(64) * roundoff<S>();
     std::array<Place, deepest> open;
     std::size_t count = 0;
     open[count++] = {starts_.size() - 1, 0};

@@ -3,7 +3,7 @@
 /// \file
 /// Orientation: unit quaternions turned by the exponential map.
 
-#include <gravel/core/types.hpp>
+#include <gravel/core/sizes.hpp>
 
 namespace gravel {
 
@@ -43,7 +43,7 @@ Quaternion<Scalar> rotated(const Quaternion<Scalar>& q, const Vector3<Scalar>& w
   const Scalar z3 = w1 * z2 + z1 * w2 + x1 * y2 - y1 * x2;
   const Scalar excess = (w3 * w3 + x3 * x3 + y3 * y3 + z3 * z3) - Scalar(1);
   // 1/sqrt(1 + x) = 1 - x/2 + 3/8 x^2 ...
-  const Scalar scale = excess * excess < Eigen::NumTraits<Scalar>::epsilon()
+  const Scalar scale = excess * excess < detail::roundoff<Scalar>()
                            ? Scalar(1) - excess / Scalar(2)
                            : Scalar(Scalar(1) / Scalar(sqrt(Scalar(1) + excess)));
   return Quaternion<Scalar>(scale * w3, scale * x3, scale * y3, scale * z3);

@@ -8,6 +8,7 @@
 /// are in the machine's own form, so a file is read on the same kind of machine; anything else is refused.
 
 #include <gravel/bodies/bodies.hpp>
+#include <gravel/core/sizes.hpp>
 #include <gravel/output/whole_file.hpp>
 
 #include <algorithm>
@@ -143,7 +144,7 @@ class SnapshotReader {
   template <Real Scalar>
   void requireUnit(const Vector3<Scalar>& normal, const char* what) const {
     const Scalar off = normal.squaredNorm() - Scalar(1);
-    const Scalar rounding = Scalar(64) * Eigen::NumTraits<Scalar>::epsilon();
+    const Scalar rounding = Scalar(64) * detail::roundoff<Scalar>();
     if (off > rounding || -off > rounding) {
       fail(std::string("holds a ") + what + " whose normal is no unit vector");
     }

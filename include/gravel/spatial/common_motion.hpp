@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 
 namespace gravel {
 
@@ -16,13 +15,6 @@ namespace gravel {
 struct AtRest {};
 
 namespace detail {
-
-/// [1] Of the scalar, or of double where the scalar does not say.
-template <Real S>
-S roundoff() {
-  using Limits = std::numeric_limits<S>;
-  return Limits::is_specialized ? S(Limits::epsilon()) : S(std::numeric_limits<double>::epsilon());
-}
 
 /// Way [m] of body i; zero for `AtRest`.
 template <Real S, class Travel>
