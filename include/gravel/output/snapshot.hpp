@@ -55,10 +55,10 @@ class SnapshotWriter {
 
   /// The file is whole or as it was; see writeFileWhole().
   /// \throws std::runtime_error with path and reason if the file cannot be written
-  void write(const std::string& path) {
+  void write(const std::string& path) const {
     const std::uint64_t sum = detail::fnv1a(detail::fnvStart, bytes_.data(), bytes_.size());
-    raw(&sum, sizeof sum);
-    detail::writeFileWhole(path, {reinterpret_cast<const char*>(bytes_.data()), bytes_.size()});
+    detail::writeFileWhole(path, {reinterpret_cast<const char*>(bytes_.data()), bytes_.size()},
+                           {reinterpret_cast<const char*>(&sum), sizeof sum});
   }
 
  private:
@@ -147,6 +147,13 @@ class SnapshotReader {
     const Scalar rounding = Scalar(64) * detail::roundoff<Scalar>();
     if (off > rounding || -off > rounding) {
       fail(std::string("holds a ") + what + " whose normal is no unit vector");
+    }
+  }
+
+  /// Refuses a file that goes on after the last record taken from it.
+  void requireEnd() const {
+    if (at_ != bytes_.size()) {
+      fail("goes on for " + std::to_string(bytes_.size() - at_) + " bytes where its end is expected");
     }
   }
 

@@ -265,6 +265,7 @@ void Space<Scalar, Layout>::restore(const std::string& path) requires std::is_tr
   }
   OrbitStage<Scalar, Layout> orbits;
   orbits.load(bodies, in);
+  in.requireEnd();
 
   // Nothing throws from here on but for want of memory.
   bodies_.assign(bodies);
