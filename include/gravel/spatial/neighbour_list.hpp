@@ -92,7 +92,7 @@ class NeighbourList {
   /// touch again clears the list.
   template <class Apart, class Ids>
   void leaveOut(const Apart& apart, const Ids& ids) {
-    std::erase_if(pairs_, apart);
+    version_ += std::erase_if(pairs_, apart) > 0 ? 1U : 0U;
     join(ids);
   }
 
