@@ -85,6 +85,25 @@ TEST_CASE("A thousand suns that pass by in single precision take the steps of do
   CHECK_THAT(h, WithinRel(stepFromMotion(wideOnes, 0.0, StepLimits<double>{0.02, 0.0, 1e12}), 1e-5));
 }
 
+// Two of 1e21 m, and two of 1e-24 m s^-2, at rest. Seen to take the longest step, as squares of what they are
+// apart, and of what pulls them, left the range.
+TEST_CASE(
+    "Points in single precision may be far apart, or hardly pulled, for a step as in double precision") {
+  const auto stepAt = [](auto size, auto pull) {
+    using S = decltype(size);
+    Bodies<S> bodies;
+    for (const S side : {S(-1), S(1)}) {
+      Body<S> body;
+      body.position[0] = side * size;
+      bodies.add(body);
+      bodies[bodies.size() - 1].acceleration() = Vector3<S>(-side * pull, 0, 0);
+    }
+    return stepFromMotion(bodies, S(0), StepLimits<S>{S(0.02), S(0), S(1e20)});
+  };
+  CHECK_THAT(double(stepAt(1e21F, 1e-6F)), WithinRel(stepAt(1e21, 1e-6), 1e-6));
+  CHECK_THAT(double(stepAt(1e3F, 1e-24F)), WithinRel(stepAt(1e3, 1e-24), 1e-6));
+}
+
 // Seen to fail: a taken in the axes of space.
 TEST_CASE("A common fall changes no step, unless something stands still") {
   Bodies<double> rest;

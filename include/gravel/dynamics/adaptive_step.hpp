@@ -19,6 +19,7 @@
 #include <gravel/bodies/bodies.hpp>
 #include <gravel/core/check.hpp>
 #include <gravel/core/parallel.hpp>
+#include <gravel/core/sizes.hpp>
 #include <gravel/dynamics/epicycle.hpp>
 #include <gravel/spatial/domain.hpp>
 
@@ -103,7 +104,7 @@ Scalar stepFromMotion(const Bodies<Scalar, Layout>& bodies, const Scalar& soften
   const Sum share = anchored || !(mass > Sum(0)) ? Sum(0) : Sum(Sum(1) / mass);
   const Vector3<Scalar> v_cm = Vector3<Sum>(v_sum * share).template cast<Scalar>();
   const Vector3<Scalar> a_cm = Vector3<Sum>(a_sum * share).template cast<Scalar>();
-  const Scalar spacing = Vector3<Scalar>(high - low).norm() / Scalar(cbrt(static_cast<double>(n)));
+  const Scalar spacing = detail::safeNorm(Vector3<Scalar>(high - low)) / Scalar(cbrt(static_cast<double>(n)));
   const Scalar floor = std::max<Scalar>(softening, spacing / Scalar(100));
   const Scalar longest = limits.largest / limits.factor;
   const Scalar least = orderedMin(n, 2048, longest, [&](std::size_t i) {
@@ -118,7 +119,7 @@ Scalar stepFromMotion(const Bodies<Scalar, Layout>& bodies, const Scalar& soften
     if (frame.turns() && anchored) {
       pull += frame.acceleration(body.position(), body.velocity());
     }
-    const Scalar a = pull.norm();
+    const Scalar a = detail::safeNorm(pull);
     const Scalar v_sq =
         Vector3<Scalar>(flow.domain.lessFlow(body.position(), body.velocity()) - v_cm).squaredNorm();
     if (a > Scalar(0) && l > Scalar(0)) {
