@@ -305,3 +305,39 @@ static_assert(!std::is_assignable_v<QuaternionView<float>&, double> &&
 static_assert(!std::is_assignable_v<ConstQuaternionView<float>&, Quaternion<float>> &&
               !std::is_assignable_v<ConstQuaternionView<float>&, ConstQuaternionView<float>>);
 static_assert(proxyRulesHold<ParticleStorage<double>>() && proxyRulesHold<BoundStorage<float>>());
+
+// A grain of gold of a nanometre, whose moment of inertia is 3e-41 kg m^2, and a giant planet of 3.7e42. Seen
+// to fail, infinite or NaN for the grain and 0 for the planet: the torque times the inverse of that.
+TEMPLATE_TEST_CASE("A torque turns what is too small, or too large, for its moment of inertia to be a number",
+                   "", float, double) {
+  using S = TestType;
+  struct Case {
+    double mass, radius, torque;
+  };
+  for (const Case& c : {Case{8e-23, 1e-9, 1e-30}, Case{1e-5, 1e-3, 1e-9}, Case{1.9e27, 7e7, 1e30}}) {
+    Bodies<S> bodies;
+    Body<S> body;
+    body.mass = S(c.mass);
+    body.radius = S(c.radius);
+    bodies.add(body);
+    const auto at = [&](const Vector3<S>& torque) {
+      return Vector3<double>(bodies[0].angularAccelerationBy(torque).template cast<double>());
+    };
+    const double exact = c.torque / (0.4 * c.mass * c.radius * c.radius);
+    CHECK(bodies[0].isTurnable());
+    CHECK_THAT(at({S(0), S(0), S(c.torque)})[2], WithinRel(exact, 1e-6));
+    CHECK(at({S(0), S(0), S(0)}).isZero(0));
+    bodies[0].setFixed(true);
+    CHECK_FALSE(bodies[0].isTurnable());
+    CHECK(at({S(0), S(0), S(c.torque)}).isZero(0));
+  }
+  Bodies<S> bodies;
+  Body<S> light;
+  light.mass = std::numeric_limits<S>::denorm_min();
+  bodies.add(light);
+  CHECK(bodies[0].accelerationBy(Vector3<S>::Zero()).isZero(0));
+  light.mass = S(0);
+  bodies.add(light);
+  CHECK(bodies[1].accelerationBy(Vector3<S>::Ones()).isZero(0));
+  CHECK(bodies[1].angularAccelerationBy(Vector3<S>::Ones()).isZero(0));
+}

@@ -58,10 +58,31 @@ class BasicBodyProxy {
     return isFixed() || !(m > Scalar(0)) ? Scalar(0) : Scalar(Scalar(1) / m);
   }
 
-  /// [kg^-1 m^-2]; zero for a fixed body and where the inertia is zero.
+  /// [kg^-1 m^-2]; zero for a fixed body and where the inertia is zero. Out of range where the inertia is.
   Scalar inverseInertia() const {
     const Scalar moment = inertia();
     return isFixed() || !(moment > Scalar(0)) ? Scalar(0) : Scalar(Scalar(1) / moment);
+  }
+
+  /// Whether a torque turns it, which a moment of inertia that is no float does not tell: that of a grain of
+  /// nanometres, or of a giant planet.
+  bool isTurnable() const {
+    return !isFixed() && mass() > Scalar(0) && radius() > Scalar(0) &&
+           Scalar(at(fields::InertiaFactor{})) > Scalar(0);
+  }
+
+  /// [m s^-2] by a force [N], [rad s^-2] by a torque [N m]; zero where they change nothing.
+  Vector3<Scalar> accelerationBy(const Vector3<Scalar>& force) const {
+    const Scalar share = inverseMass();
+    return isFinite(share) ? Vector3<Scalar>(force * share) : Vector3<Scalar>(force / Scalar(mass()));
+  }
+  Vector3<Scalar> angularAccelerationBy(const Vector3<Scalar>& torque) const {
+    const Scalar share = inverseInertia();
+    if ((isFinite(share) && share > Scalar(0)) || !isTurnable()) {
+      return torque * share;
+    }
+    const Scalar r = radius();
+    return torque / Scalar(Scalar(at(fields::InertiaFactor{})) * Scalar(mass())) / r / r;
   }
 
   /// [m s^-1], [rad s^-1] as they count: what is written to a fixed body does not move it.

@@ -264,8 +264,8 @@ class ForceStage {
                        "finite");
       }
       if (!body.isFixed()) {
-        body.acceleration() += hookForces_[i] * body.inverseMass();
-        body.angularAcceleration() = body.torque() * body.inverseInertia();
+        body.acceleration() += body.accelerationBy(hookForces_[i]);
+        body.angularAcceleration() = body.angularAccelerationBy(body.torque());
       }
     }
   }

@@ -90,7 +90,7 @@ class HookWork {
 
   /// [m s^-2] by which a force that is now `forces` differs from what it was.
   Vector3<Scalar> changeOf(const Bodies& bodies, Forces forces, std::size_t i) const {
-    return (of(forces, i) - of(forces_, i)) * bodies[i].inverseMass();
+    return bodies[i].accelerationBy(of(forces, i) - of(forces_, i));
   }
 
   /// [J] since the last begin(), after the last endPart(). \param forces [N] at the end
@@ -145,7 +145,7 @@ class HookWork {
         return moves ? Scalar(force.dot(velocity)) : Scalar(0);
       };
       return Sums(product(body.inverseMass() > Scalar(0), of(forces, i), body.velocity()),
-                  product(body.inverseInertia() > Scalar(0), of(torques, i), body.angularVelocity()));
+                  product(body.isTurnable(), of(torques, i), body.angularVelocity()));
     });
   }
 
