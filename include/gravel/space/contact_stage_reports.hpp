@@ -273,8 +273,7 @@ auto ContactStage<Scalar, Layout>::allTouches(const Bodies& bodies) const -> Tou
 
 /// Contacts of what merged are found again at the end of the next part. All others bear what they bore.
 template <Real Scalar, class Layout>
-void ContactStage<Scalar, Layout>::endMerged(const Bodies& bodies,
-                                             const BodyPairs& merges) {
+void ContactStage<Scalar, Layout>::endMerged(const Bodies& bodies, const BodyPairs& merges) {
   std::vector<std::uint64_t> ids;
   for (const auto& [one, other] : merges) {
     ids.insert(ids.end(), {toInteger(one), toInteger(other)});

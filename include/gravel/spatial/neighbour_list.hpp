@@ -88,8 +88,7 @@ class NeighbourList {
     }
   }
 
-  /// Leaves out pairs of which `apart(pair)` until the next search: they cannot touch. Whoever lets them
-  /// touch again clears the list.
+  /// Leaves out pairs of which `apart(pair)`: they cannot touch. Who lets them touch again clears the list.
   template <class Apart, class Ids>
   void leaveOut(const Apart& apart, const Ids& ids) {
     version_ += std::erase_if(pairs_, apart) > 0 ? 1U : 0U;
