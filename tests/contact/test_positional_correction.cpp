@@ -515,6 +515,123 @@ TEST_CASE("all who are moved are listed once, with what they moved by, for any n
   omp_set_num_threads(before);
 }
 
+// A sweep alone opens 2 m/M of what the light one lacks.
+// Seen to fail: without leaps (1000 sweeps, still closed); the hub's share of a move, or of a velocity, left
+// out; velocities as they are; half a leap (more sweeps).
+TEMPLATE_TEST_CASE("light bodies between heavy ones are opened in some sweeps, whatever the ratio of masses",
+                   "", GRAVEL_TEST_TYPES(double, float, long double)) {
+  using S = TestType;
+  const S overlap = S(0.007);  // of radii 0.1 and 1
+  for (const double ratio : {1e3, 1e6, 1e9}) {
+    for (const bool onFloor : {false, true}) {
+      Bodies<S, SoA> bodies;
+      Body<S> body;
+      body.radius = S(0.1);
+      body.position = {S(0), S(0), body.radius - overlap};
+      body.velocity = {S(0.3), S(-0.1), S(0)};
+      bodies.add(body);
+      body.radius = S(1);
+      body.mass = S(ratio);
+      body.position[2] = S(0.2) - S(2) * overlap + body.radius;
+      body.velocity = {S(1), S(0), S(0)};
+      bodies.add(body);
+      if (!onFloor) {
+        body.mass *= S(2);
+        body.position[2] = -body.radius;
+        body.velocity = {S(0), S(2), S(0)};
+        bodies.add(body);
+      }
+      const auto contacts =
+          contactsOf<S>(bodies, Material<S>{}, onFloor ? floorAtZero<S>() : std::vector<HalfSpace<S>>{});
+      REQUIRE(contacts.size() == 2);
+      const Bodies<S, SoA> before = bodies;
+      CorrectionSettings<S> settings;
+      settings.islandLooks = usualLooks;
+      PositionalCorrection<S> correction;
+      const auto report = correct(bodies, contacts, settings, correction);
+      CHECK(report.iterations <= 20);
+      const S kept = (S(1) - settings.factor + S(2) * settings.tolerance) * overlap;
+      CHECK(gapOf(bodies, 0, 1) >= -kept);
+      CHECK((onFloor ? S(bodies[0].position()[2] - bodies[0].radius()) : gapOf(bodies, 0, 2)) >= -kept);
+      const S room = bodies[1].position()[2] - (onFloor ? S(0) : S(bodies[2].position()[2] + S(1))) - S(1.2);
+      CHECK(room <= S(-1.9) * kept);  // nor by more than is asked for
+      const Totals now(bodies);
+      const Totals then(before);
+      CHECK(std::abs(now.energy + report.loss - then.energy) <= 64 * eps<S> * then.energy);
+      CHECK((now.momentum - then.momentum).norm() <= 64 * eps<S> * then.momentumScale);
+      if (!onFloor) {
+        CHECK((now.angular - then.angular).norm() <= 64 * eps<S> * then.angularScale);
+        CHECK(report.loss > 0);
+        Vector3<Wide> moment = Vector3<Wide>::Zero();
+        for (std::size_t i = 0; i < bodies.size(); ++i) {
+          const Vector3<S> shift = bodies[i].position() - before[i].position();
+          moment += Wide(bodies[i].mass()) * shift.template cast<Wide>();
+        }
+        CHECK(moment.norm() <= 64 * eps<S> * Wide(3 * ratio));
+      }
+    }
+  }
+}
+
+// Seen to fail: leaps of an island by what all islands of its bundle lack.
+TEST_CASE("islands leap alike, whatever lies beside them, for any number of threads") {
+  constexpr std::uint32_t islands = 600;
+  const auto build = [](std::uint32_t first, std::uint32_t end) {
+    Bodies<double, SoA> bodies;
+    for (std::uint32_t i = first; i < end; ++i) {
+      Body<double> body;
+      const double deep = 0.001 + 1e-5 * (i % 7);
+      body.radius = 0.1;
+      body.position = {4.0 * i, 0, 0};
+      body.velocity = {0, 0.1 * (i % 5), 0};
+      bodies.add(body);
+      body.radius = 1;
+      body.velocity = {1, 0, 0};
+      for (const double side : {-1.0, 1.0}) {
+        body.mass = std::pow(10.0, i % 10);
+        body.position[2] = side * (1.1 - deep);
+        body.velocity *= -1;
+        bodies.add(body);
+      }
+    }
+    return bodies;
+  };
+  const auto corrected = [](Bodies<double, SoA>& bodies) {
+    std::vector<Pair> pairs;
+    for (std::uint32_t i = 0; i < bodies.size(); i += 3) {
+      pairs.push_back({i, i + 1});
+      pairs.push_back({i, i + 2});
+    }
+    ContactList<double> contacts;
+    const std::vector<Material<double>> materials{{}};
+    NarrowPhase<double>().find(pairs, bodies, Domain<double>::open(), materials, {}, {}, contacts);
+    REQUIRE(contacts.size() == pairs.size());
+    CorrectionSettings<double> settings;
+    settings.islandLooks = usualLooks;
+    PositionalCorrection<double> correction;
+    correct(bodies, contacts, settings, correction);
+  };
+  const int before = omp_get_max_threads();
+  for (const int threads : {1, 2, 3}) {
+    omp_set_num_threads(threads);
+    Bodies<double, SoA> together = build(0, islands);
+    corrected(together);
+    std::size_t others = 0;
+    for (std::uint32_t i = 0; i < islands; i += 30 + threads) {
+      Bodies<double, SoA> alone = build(i, i + 1);
+      corrected(alone);
+      for (std::size_t k = 0; k < 3; ++k) {
+        others += alone[k].position() == together[3 * i + k].position() &&
+                          alone[k].velocity() == together[3 * i + k].velocity()
+                      ? 0U
+                      : 1U;
+      }
+    }
+    CHECK(others == 0);
+  }
+  omp_set_num_threads(before);
+}
+
 TEST_CASE("settings of the correction out of range are refused, and nothing is moved") {
   Bodies<double, SoA> bodies = randomCloud<double>(40, 2.0, 5);
   const auto contacts = contactsOf(bodies, Material<double>{});

@@ -8,12 +8,14 @@
 #include <gravel/contact/contact_settings.hpp>
 #include <gravel/contact/correction_settings.hpp>
 #include <gravel/contact/overlap_lanes.hpp>
+#include <gravel/contact/overlap_leaps.hpp>
 #include <gravel/contact/row_watch.hpp>
 #include <gravel/contact/stirred_blocks.hpp>
 #include <gravel/core/memory.hpp>
 #include <gravel/core/parallel.hpp>
 
 #include <numeric>
+#include <utility>
 
 namespace gravel {
 
@@ -23,7 +25,7 @@ namespace gravel {
 /// displacements enter, so that a place far from the origin costs no digits. A contact is passed over while
 /// its bodies have moved by less than half of what ends the sweeps since it was opened, or at all where its
 /// overlap is hardly any: so one ball wedged into a heap costs what its surroundings cost. Sweeps over a
-/// small island end as its own overlaps say, and the others' together.
+/// small island end as its own overlaps say, and the others' together; light ones leap (OverlapLeaps).
 ///
 /// Two spheres that are moved apart from r to r + d would gain the angular momentum m* d x v of their
 /// relative velocity v. As on an orbit, the part of v across r becomes v_t r/(r + d) instead: momentum and
@@ -65,7 +67,7 @@ class PositionalCorrection {
     stirred_.begin(colouring);
     const Opened ofIslands = orderedSum<Share::AsFree>(
         colouring.bundles(), 1, Opened{}, [&](std::size_t bundle, std::size_t /*next*/) {
-          return openBundle(contacts, colouring, bundle, settings);
+          return openBundle(contacts, colouring, bundle, bodies, settings);
         });
     Course course{enough, settings.maxIterations};
     bool goesOn = true;
@@ -82,9 +84,10 @@ class PositionalCorrection {
           detail::prefetch(shifts_[place.slot2]);
         };
         detail::forGroupsOf<S>(colouring, begin, end, stale, fetch, [&](const Group& group) {
-          openAll(contacts, colouring, group, settings, [&](const Pack& missing, const Pack& loss) {
-            sum += {missing.largest(), loss.sum()};
-          });
+          openAll(contacts, colouring, group, settings,
+                  [&](const Pack& missing, const Pack& /*kept*/, const Pack& loss) {
+                    sum += {missing.largest(), loss.sum()};
+                  });
         });
       };
       // Lone contacts are right after one sweep.
@@ -153,12 +156,15 @@ class PositionalCorrection {
     S right = S(0);
     Course course;
     Opened now;
+    S before = S(0);  ///< largest move of the last sweep but one
     bool ended = false;
   };
 
   /// Opens the contacts of small islands.
+  template <class B>
   [[gnu::flatten]] Opened openBundle(std::span<const Contact<S>> contacts, const ContactColoring& colouring,
-                                     std::size_t bundle, const CorrectionSettings<S>& settings) {
+                                     std::size_t bundle, const B& bodies,
+                                     const CorrectionSettings<S>& settings) {
     const std::uint32_t first = colouring.islands().firstOf(bundle);
     std::vector<Island> islands(colouring.islands().firstOf(bundle + 1) - first);
     const auto islandOf = [&](std::size_t k) -> Island& { return islands[colouring.islandOf(k) - first]; };
@@ -184,10 +190,12 @@ class PositionalCorrection {
       watch_.enterFirst(k, !(-contacts[colouring.rows()[k].contact].gap > islandOf(k).right / S(4)));
     }
     Opened all;
-    while (left > 0) {
+    detail::OverlapLeaps<S> leaps(colours.front().begin, colours.back().end, islands.size());
+    for (int sweep = 1; left > 0; ++sweep) {
       for (Island& island : islands) {
-        island.now = {};
+        island.before = std::exchange(island.now, {}).largest;
       }
+      leaps.begin(sweep);
       for (const ContactColoring::Part& colour : colours) {
         const auto stale = [&](std::size_t k) {
           const ContactColoring::Row& place = colouring.rows()[k];
@@ -195,11 +203,13 @@ class PositionalCorrection {
           return !island.ended && watch_.isStale(k, place.slot1, place.slot2, S(island.course.enough / S(2)));
         };
         detail::forGroupsOf<S>(colouring, colour.begin, colour.end, stale, [&](const Group& group) {
-          openAll(contacts, colouring, group, settings, [&](const Pack& missing, const Pack& loss) {
-            for (std::size_t lane = 0; lane < group.count; ++lane) {
-              islandOf(group.row[lane]).now += {missing[lane], loss[lane]};
-            }
-          });
+          openAll(contacts, colouring, group, settings,
+                  [&](const Pack& missing, const Pack& kept, const Pack& loss) {
+                    leaps.take(group, missing, kept);
+                    for (std::size_t lane = 0; lane < group.count; ++lane) {
+                      islandOf(group.row[lane]).now += {missing[lane], loss[lane]};
+                    }
+                  });
         });
       }
       for (Island& island : islands) {
@@ -210,6 +220,15 @@ class PositionalCorrection {
           --left;
         }
       }
+      all.loss += leaps.leap(
+          contacts, colouring, shifts_, settings.keepAngularMomentum,
+          [&](std::size_t k) {
+            const Island& island = islandOf(k);
+            const bool isSlow = !island.ended && island.now.largest > S(0.9) * island.before;
+            return isSlow ? std::size_t{colouring.islandOf(k) - first} : islands.size();
+          },
+          [&](std::size_t slot) -> Vector3<S> { return bodies.positions()[colouring.bodies()[slot]]; },
+          [&](std::uint32_t slot, const S& way) { watch_.move(slot, way); });
     }
     return all;
   }
@@ -258,7 +277,7 @@ class PositionalCorrection {
     });
   }
 
-  /// Opens the contacts of these rows. \param tell  called with what was missing [m], and lost [J]
+  /// Opens these rows. \param tell  called with what was missing and is kept [m], and lost [J]
   template <class Tell>
   [[gnu::flatten]] void openAll(std::span<const Contact<S>> contacts, const ContactColoring& colouring,
                                 const Group& group, const CorrectionSettings<S>& settings, Tell&& tell) {
@@ -286,7 +305,7 @@ class PositionalCorrection {
       move(group.slot2[lane], opened.way2[lane]);
       watch_.enter(group.row[lane], group.slot1[lane], group.slot2[lane]);
     }
-    tell(opened.missing, opened.loss);
+    tell(opened.missing, kept, opened.loss);
   }
 
   std::vector<Body> shifts_;  ///< by slot; the last one is the boundary
