@@ -573,6 +573,36 @@ TEMPLATE_TEST_CASE("light bodies between heavy ones are opened in some sweeps, w
   }
 }
 
+// Of one mass, in a line: nobody is light between others. Seen to fail: leaps of islands of any size, in
+// which the first sphere took the recoil of all that moved away from it, and was thrown far from the second.
+TEST_CASE("A row of equal spheres is opened without gaps, however many they are") {
+  for (const int count : {3, 8, 12, 25, 60, 150}) {
+    for (const double bend : {0.0, 0.02}) {
+      Bodies<double, SoA> bodies;
+      const double overlap = 0.01;
+      Body<double> body;
+      body.radius = 0.5;
+      body.velocity = {0, 0.1, 0};
+      for (int i = 0; i < count; ++i) {
+        bodies.add(body);
+        body.position += (1 - overlap) * Vector3<double>(std::cos(bend * i), std::sin(bend * i), 0);
+      }
+      CorrectionSettings<double> settings;
+      settings.islandLooks = usualLooks;
+      PositionalCorrection<double> correction;
+      CAPTURE(count, bend);
+      for (int k = 0; k < 20; ++k) {
+        const auto contacts = contactsOf(bodies, Material<double>{});
+        CHECK((k > 0 || contacts.size() == static_cast<std::size_t>(count - 1)));
+        correct(bodies, contacts, settings, correction);
+        for (std::size_t i = 1; i < bodies.size(); ++i) {
+          CHECK(gapOf(bodies, i - 1, i) < settings.factor * overlap);
+        }
+      }
+    }
+  }
+}
+
 // Seen to fail: leaps of an island by what all islands of its bundle lack.
 TEST_CASE("islands leap alike, whatever lies beside them, for any number of threads") {
   constexpr std::uint32_t islands = 600;

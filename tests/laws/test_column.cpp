@@ -113,13 +113,11 @@ TEST_CASE("Stacks of mass ratio 1000 stand at a step of 1/60 s") {
   }
 }
 
-// A ball on a light one on a floor, overlapping it by 0.04 radii. A sweep carries the light one to and fro
-// between its two neighbours, and lifts the ball by 1/(1 + ratio) of what is still missing to 0.4 of the
-// overlap. So a step of 1000 sweeps, what two contacts get, takes 0.4 (1 - exp(-1000/ratio)) of the overlap.
-// The steps to a quarter, and two more: the first one shares the overlap between the contacts, and the last
-// one is not whole. Seen to fail: 20 sweeps (175 and 1665 steps).
-TEST_CASE("A heavy ball pressed into a light one is lifted off by as many sweeps as few contacts get") {
-  for (const double ratio : {1e3, 1e4}) {
+// A ball on a light one on a floor, overlapping it by 0.04 radii. A step takes 0.4 of what there is, to a
+// quarter in three steps. Seen to fail: without leaps, where a sweep lifts the ball by 1/(1 + ratio) of what
+// is missing (5 and 36 steps of 1000 sweeps at the first two ratios).
+TEST_CASE("A heavy ball pressed into a light one is lifted off by 0.4 of it a step, whatever the ratio") {
+  for (const double ratio : {1e3, 1e4, 1e6}) {
     Space<double> space(plain(1.0 / 60));
     space.setUniformField({0, 0, -g});
     space.addPlane({0, 0, 1}, 0.0);
@@ -133,9 +131,8 @@ TEST_CASE("A heavy ball pressed into a light one is lifted off by as many sweeps
         deepest = std::max(deepest, -c.gap);
       }
     }
-    const double expected = std::log(4.0) / -std::log1p(-0.4 * -std::expm1(-1000 / ratio));
-    CAPTURE(ratio, steps, expected);
-    CHECK(std::abs(static_cast<double>(steps) - expected) <= 2);
+    CAPTURE(ratio);
+    CHECK(steps == 3);  // log(1/4) / log(0.6) = 2.7
   }
 }
 

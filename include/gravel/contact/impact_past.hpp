@@ -3,6 +3,7 @@
 /// \file
 /// What each body has been through in a step, by the impacts that were dealt in it.
 
+#include <gravel/contact/collision_outcome.hpp>
 #include <gravel/contact/contact_islands.hpp>
 #include <gravel/contact/impact_histories.hpp>
 #include <gravel/core/memory.hpp>

@@ -66,19 +66,22 @@ class OverlapLeaps {
     const auto forRows = [&](auto&& f) {
       for (std::size_t k = begin_; k < end_; ++k) {
         const std::size_t number = numberOf(k);
-        if (number < count_ && rows_[k - begin_].missing > S(0)) {
+        if (number < count_) {
           f(islands_[number], rows_[k - begin_], colouring.rows()[k]);
         }
       }
     };
     forRows([](Island& island, const Opened& row, const ContactColoring::Row&) {
       island.largest = std::max<S>(island.largest, row.missing);
+      ++island.rows;
     });
     forRows([&](Island& island, const Opened& row, const ContactColoring::Row& ends) {
-      add(island, row, contacts[ends.contact], ends, bodies);
+      if (row.missing > S(0) && island.rows <= mostRows) {
+        add(island, row, contacts[ends.contact], ends, bodies);
+      }
     });
     for (Island& island : islands_) {
-      if (island.largest > S(0)) {
+      if (!island.moves.empty()) {
         loss += leap(island, bodies, keepAngularMomentum && !island.leans, positionOf, tell);
       }
     }
@@ -86,6 +89,9 @@ class OverlapLeaps {
   }
 
  private:
+  /// A body between two others. Islands of more have slow moves that decay alike; to go on by all of them at
+  /// once opened gaps, of ten times the overlaps in a row of 50, and let stacks part.
+  static constexpr std::size_t mostRows = 2;
   static constexpr int every = 8;      ///< sweeps: by then most islands have ended
   static constexpr int fewest = 16;    ///< moves of a sweep that make a leap
   static constexpr int farthest = 4;   ///< times the largest overlap a body leaps
@@ -100,13 +106,15 @@ class OverlapLeaps {
     S largest = S(0);                           ///< [m] missing
     std::map<std::uint32_t, Vector3<S>> moves;  ///< by slot, of the last sweep, over `largest`
     S work = S(0);                              ///< sum P_k g_k, over its square
-    bool leans = false;                         ///< on a plane
-    bool isHeld = false;                        ///< by a fixed sphere
+    std::size_t rows = 0;
+    bool leans = false;   ///< on a plane
+    bool isHeld = false;  ///< by a fixed sphere
     std::uint32_t hub = 0;
 
     void reset() {
       moves.clear();
       largest = work = S(0);
+      rows = 0;
       leans = isHeld = false;
     }
   };
@@ -151,9 +159,10 @@ class OverlapLeaps {
     S most = S(0);
     S longest = S(0);
     for (const auto& [slot, move] : island.moves) {
-      const S borne = bodies[slot].mass * move.norm();
-      size += borne * move.norm();
-      longest = std::max<S>(longest, move.norm());
+      const S way = safeNorm(move);
+      const S borne = bodies[slot].mass * way;
+      size += borne * way;
+      longest = std::max<S>(longest, way);
       if (!island.isHeld && !(borne < most)) {
         most = borne;
         island.hub = slot;

@@ -25,7 +25,7 @@ namespace gravel {
 /// displacements enter, so that a place far from the origin costs no digits. A contact is passed over while
 /// its bodies have moved by less than half of what ends the sweeps since it was opened, or at all where its
 /// overlap is hardly any: so one ball wedged into a heap costs what its surroundings cost. Sweeps over a
-/// small island end as its own overlaps say, and the others' together; light ones leap (OverlapLeaps).
+/// small island end as its own overlaps say, and the others' together; a light body between two leaps.
 ///
 /// Two spheres that are moved apart from r to r + d would gain the angular momentum m* d x v of their
 /// relative velocity v. As on an orbit, the part of v across r becomes v_t r/(r + d) instead: momentum and

@@ -146,9 +146,7 @@ void Space<Scalar, Layout>::prepare(const Scalar& h) {
     forcesValid_ = false;  // if a hook throws
     applyGravity();
     stepGoesOn_ = false;
-    if (steps_ == 0) {  // contacts are taken to rest by what falls in a step, of which none has been
-      updateAdaptiveTimeStep();
-    }
+    updateAdaptiveTimeStep();  // contacts are taken to rest by what falls in a step
     buildCollisionGraph();
     rememberPlaces();
     updateAdaptiveTimeStep();
