@@ -406,7 +406,7 @@ TEST_CASE("Softening acts on near images as on the bodies themselves") {
 }
 
 TEMPLATE_TEST_CASE("Images pull bodies of every scalar", "",
-                   GRAVEL_TEST_TYPES(long double, float, MinimalReal)) {
+                   GRAVEL_TEST_TYPES(double, long double, float, MinimalReal)) {
   using S = TestType;
   const auto points = inBox<double>(40, brick);
   PointMasses<S> own;

@@ -298,7 +298,8 @@ TEST_CASE("Every setting is visited once, with a name and a unit") {
   CHECK(names.size() >= 26);
 }
 
-TEMPLATE_TEST_CASE("A configuration of any scalar has valid defaults", "", float, double, long double) {
+TEMPLATE_TEST_CASE("A configuration of any scalar has valid defaults", "",
+                   GRAVEL_TEST_TYPES(double, float, long double)) {
   const SimulationConfig<TestType> config;
   CHECK_NOTHROW(config.validate());
   Space<TestType> space(config);

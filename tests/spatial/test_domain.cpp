@@ -31,8 +31,8 @@ Wide offLattice(const WideVector& r, const Domain<S>& domain, const S& time) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("an image is the shortest of all images, and one of them", "", float, double,
-                   long double) {
+TEMPLATE_TEST_CASE("an image is the shortest of all images, and one of them", "",
+                   GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
   const CounterRandom random(11);
   // Each coordinate is rounded a few times at a magnitude of at most 4 boxes of length 3.
@@ -51,8 +51,8 @@ TEMPLATE_TEST_CASE("an image is the shortest of all images, and one of them", ""
 }
 
 // Seen to fail with the next image in x on one side alone.
-TEMPLATE_TEST_CASE("in a sheared box long in y the shortest image may be several boxes out in x", "", float,
-                   double, long double) {
+TEMPLATE_TEST_CASE("in a sheared box long in y the shortest image may be several boxes out in x", "",
+                   GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
   const CounterRandom random(15);
   const Wide tolerance = 256 * static_cast<Wide>(std::numeric_limits<S>::epsilon());
@@ -79,8 +79,8 @@ TEMPLATE_TEST_CASE("in a sheared box long in y the shortest image may be several
 }
 
 // Where a unit in the last place is more than a box. Seen to fail: never ended, a box at a time.
-TEMPLATE_TEST_CASE("the image of a separation of too many boxes for its digits is found at once", "", float,
-                   double, long double) {
+TEMPLATE_TEST_CASE("the image of a separation of too many boxes for its digits is found at once", "",
+                   GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
   const auto domain = Domain<S>::shearPeriodic({S(10), S(10), S(10)}, S(1));
   const CounterRandom random(17);
@@ -91,8 +91,8 @@ TEMPLATE_TEST_CASE("the image of a separation of too many boxes for its digits i
   }
 }
 
-TEMPLATE_TEST_CASE("the image of the opposite separation is the opposite image, bit for bit", "", float,
-                   double, long double) {
+TEMPLATE_TEST_CASE("the image of the opposite separation is the opposite image, bit for bit", "",
+                   GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
   const CounterRandom random(12);
   for (const Domain<S>& domain : boxes<S>()) {
@@ -118,8 +118,8 @@ TEST_CASE("an open domain has one image of everything") {
   CHECK(open == Domain<double>{});
 }
 
-TEMPLATE_TEST_CASE("wrapping brings a body into the half-open box, onto one of its images", "", float, double,
-                   long double) {
+TEMPLATE_TEST_CASE("wrapping brings a body into the half-open box, onto one of its images", "",
+                   GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
   const CounterRandom random(13);
   const Wide tolerance = 64 * static_cast<Wide>(std::numeric_limits<S>::epsilon());
@@ -149,7 +149,8 @@ TEMPLATE_TEST_CASE("wrapping brings a body into the half-open box, onto one of i
   CHECK(x[2] >= S(-1));
 }
 
-TEMPLATE_TEST_CASE("what is at no place is not brought into the box", "", float, double, long double) {
+TEMPLATE_TEST_CASE("what is at no place is not brought into the box", "",
+                   GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
   for (const Domain<S>& domain : boxes<S>()) {
     for (const double nowhere : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
@@ -166,8 +167,8 @@ TEMPLATE_TEST_CASE("what is at no place is not brought into the box", "", float,
 
 // Seen to fail with the sign of the speed turned round; so do the tests before and after with that of the
 // offset.
-TEMPLATE_TEST_CASE("a body that rides the sheared flow still rides it after it has left the box", "", float,
-                   double) {
+TEMPLATE_TEST_CASE("a body that rides the sheared flow still rides it after it has left the box", "",
+                   GRAVEL_TEST_TYPES(double, float)) {
   using S = TestType;
   for (const double omega : {1.0, -0.7}) {
     const auto domain = Domain<S>::shearPeriodic({S(2), S(3), S(1)}, S(omega));
@@ -185,7 +186,7 @@ TEMPLATE_TEST_CASE("a body that rides the sheared flow still rides it after it h
 
 // Two neighbours, one of which crosses a face: what each sees of the other must not jump.
 TEMPLATE_TEST_CASE("separation and relative velocity do not jump when one of two bodies is wrapped", "",
-                   float, double, long double) {
+                   GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
   const CounterRandom random(14);
   const S tolerance = 64 * std::numeric_limits<S>::epsilon();

@@ -36,7 +36,7 @@ std::vector<std::size_t> bruteWithin(const std::vector<Vector3<S>>& points, cons
 }  // namespace
 
 TEMPLATE_TEST_CASE("a k-d tree and a grid visit the points within a radius, each once, and no others", "",
-                   float, double, long double) {
+                   GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
   const auto cloud = randomCloud<S>(700, 2.0, 0.1, 1.0, 41);
   KDTree<S> tree;
@@ -58,8 +58,8 @@ TEMPLATE_TEST_CASE("a k-d tree and a grid visit the points within a radius, each
   CHECK(total > 70000);
 }
 
-TEMPLATE_TEST_CASE("points are found where the square of a radius leaves the range of numbers", "", float,
-                   double, long double) {
+TEMPLATE_TEST_CASE("points are found where the square of a radius leaves the range of numbers", "",
+                   GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
   const auto cloud = randomCloud<S>(300, 2.0, 0.1, 1.0, 43);
   constexpr int exponent = std::is_same_v<S, float> ? 70 : 600;
@@ -149,8 +149,8 @@ TEST_CASE("a grid refuses an edge of cells that is not above zero") {
   CHECK_THROWS_AS(grid.build(points, std::nan("")), std::invalid_argument);
 }
 
-TEMPLATE_TEST_CASE("Morton order is a permutation in which keys ascend, ties by index", "", float, double,
-                   long double) {
+TEMPLATE_TEST_CASE("Morton order is a permutation in which keys ascend, ties by index", "",
+                   GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
   auto cloud = randomCloud<S>(2000, 3.0, 0.1, 1.0, 42);
   cloud.positions[100] = cloud.positions[1900];
