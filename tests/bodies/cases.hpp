@@ -1,7 +1,7 @@
 #pragma once
 
-/// Every storage with every built-in scalar, and values that tell each coefficient of each body from any
-/// other.
+/// Every storage in double, some in the other built-in scalars, and values that tell each coefficient of each
+/// body from any other.
 
 #include "support/archetypes.hpp"
 #include "support/catch.hpp"

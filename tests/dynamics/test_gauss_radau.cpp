@@ -322,7 +322,7 @@ TEST_CASE("What it remembers can be taken up, and is void where somebody moved a
   method.advance(bodies, 5.0, false, forces);
   fresh.advance(twin, 5.0, false, twins);
   CHECK((bodies[0].position() - twin[0].position()).norm() < 1e-14);
-  CHECK(method.stepFactor() == fresh.stepFactor());
+  CHECK_THAT(method.nextStep(), WithinRel(fresh.nextStep(), 1e-9));  // by the rounding of the last term
   CHECK_THROWS_AS(method.setStepFactor(0.0), std::invalid_argument);
   CHECK_THROWS_AS(method.setStepFactor(std::numeric_limits<double>::quiet_NaN()), std::invalid_argument);
 }

@@ -238,7 +238,7 @@ TEST_CASE("Velocity Verlet of an oscillator is a cosine of the closed-form frequ
   CHECK(std::abs(std::cos(1000 * theta) - std::cos(1000 * 0.3L)) > 0.1L);  // it is not the exact solution
 }
 
-// A7: 1000 steps forward, v turned round, 1000 back. Every step rounds by about 1e-16 and the orbit of 1000
+// 1000 steps forward, v turned round, 1000 back. Every step rounds by about 1e-16 and the orbit of 1000
 // steps amplifies linearly, so 1e-12 has a margin of ten.
 TEST_CASE("Every method runs backwards to where it began") {
   for (const IntegratorKind kind : kinds) {
@@ -256,7 +256,7 @@ TEST_CASE("Every method runs backwards to where it began") {
 }
 
 // A symplectic method keeps a neighbouring energy: after 1000 orbits of 200 steps the error is what it was in
-// the first (A1: 1.05e2 / n^2 at e = 0.5), where a method that is not grows a thousandfold.
+// the first (1.05e2 / n^2 at e = 0.5), where a method that is not grows a thousandfold.
 TEST_CASE("The energy error does not grow in a thousand orbits") {
   auto bodies = orbiter<double>(0.5);
   const double start = orbitalEnergy(bodies[0].load());

@@ -541,8 +541,9 @@ TEST_CASE("A domain too long for its images is refused, and the one before stays
                     ContainsSubstring("is 2e+05; allowed: at most 10000, 10000 times the shortest"));
   const std::vector<Vector3<double>> x{{0, 0, 0}, {1, 1, 1}};
   const std::vector<double> m{1, 1};
-  const double before = DirectSum<double>().potentialEnergy(x, m, 1.0, 0.0);
-  CHECK(sum.potentialEnergy(x, m, 1.0, 0.0) != before);  // images still pull
+  DirectSum<double> before;
+  before.setDomain(Domain<double>::periodic({2, 3, 4}));
+  CHECK(sum.potentialEnergy(x, m, 1.0, 0.0) == before.potentialEnergy(x, m, 1.0, 0.0));
   CHECK_NOTHROW(sum.setDomain(Domain<double>::periodic({1000, 1, 1})));
   CHECK_NOTHROW(sum.setDomain(Domain<double>::shearPeriodic({1, 1, 1e300}, 1)));  // gravity is open in z
 }

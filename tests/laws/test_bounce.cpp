@@ -14,14 +14,14 @@ constexpr double g = 9.81;
 constexpr double radius = 0.1;
 
 struct Drop {
-  double time = 0;       ///< of the last bounce that the step resolves
-  double moved = 0;      ///< in the second after that
-  double gap = 0;        ///< to the plane at the end
-  double speed = 0;      ///< largest |v| in the second after that
-  double firstPeak = 0;  ///< height after the first bounce
+  double time = 0;   ///< of the last bounce that the step resolves
+  double moved = 0;  ///< in the second after that
+  double gap = 0;    ///< to the plane at the end
+  double speed = 0;  ///< largest |v| in the second after that
 };
 
-Drop drop(double e, double dt, double height = 1.0) {
+Drop drop(double e, double dt) {
+  const double height = 1.0;
   SimulationConfig<double> config = plain(dt);
   config.coeffRestitution = e;
   Space<double> space(config);
@@ -31,19 +31,12 @@ Drop drop(double e, double dt, double height = 1.0) {
   Drop result;
   const double end = std::sqrt(2 * height / g) * (1 + e) / (1 - e);
   std::size_t i = 0;
-  int bounces = 0;
-  double before = 0;
   while (space.time() < 1.1 * end + 0.2) {
     space.computeDynamics(i++);
     const double v = space.body(0).velocity()[2];
-    bounces += before < 0 && v > 0 ? 1 : 0;
-    if (bounces == 1) {
-      result.firstPeak = std::max(result.firstPeak, space.body(0).position()[2] - radius);
-    }
     if (std::abs(v) > 1e-12 * std::sqrt(2 * g * height)) {
       result.time = space.time();
     }
-    before = v;
   }
   const double place = space.body(0).position()[2];
   for (int k = 0; k < static_cast<int>(1.0 / dt); ++k) {

@@ -53,6 +53,7 @@ TEST_CASE("On an incline a sphere stays while the tangent is below the rolling c
   for (const double part : {0.5, 0.98, 1.02, 2.0}) {
     const double slope = std::atan(part * mu_r);
     Space<double> space = onPlane(slope, 1.0, mu_r, 0, 1e-3, {0, 0, 0}, {0, 0, 0});
+    const double start = space.energyLedger().total();
     advance(space, 1000);
     const double v = space.body(0).velocity()[0];
     CAPTURE(part, v);
@@ -62,7 +63,7 @@ TEST_CASE("On an incline a sphere stays while the tangent is below the rolling c
       // m a = m g sin - F, I a / R = F R - mu_r R m g cos: a = 5/7 g (sin - mu_r cos)
       CHECK_THAT(v, WithinRel(5.0 / 7 * g * (std::sin(slope) - mu_r * std::cos(slope)), 1e-6));
     }
-    CHECK_THAT(space.energyLedger().total(), WithinAbs(0.0, 1e-9 + 2.0 * g * std::cos(slope) * 0.5 * 1.01));
+    CHECK_THAT(space.energyLedger().total(), WithinAbs(start, 1e-9));
   }
 }
 
@@ -217,7 +218,6 @@ TEST_CASE("A rolling sphere comes to rest after 7 v^2 / (10 mu_r g), and stays")
     CHECK(space.body(0).angularVelocity().norm() < 1e-12);
     return std::abs(space.body(0).position()[0] - way);
   };
-  CHECK(miss(1e-3) < v * 1e-3);
   CHECK(miss(1e-3) < 2e-5);  // mu_r g dt^2 and the step in which it stops
 }
 
