@@ -647,7 +647,7 @@ TEST_CASE("islands leap alike, whatever lies beside them, for any number of thre
     Bodies<double, SoA> together = build(0, islands);
     corrected(together);
     std::size_t others = 0;
-    for (std::uint32_t i = 0; i < islands; i += 30 + threads) {
+    for (std::uint32_t i = 0; i < islands; i += 30 + static_cast<std::uint32_t>(threads)) {
       Bodies<double, SoA> alone = build(i, i + 1);
       corrected(alone);
       for (std::size_t k = 0; k < 3; ++k) {
