@@ -13,7 +13,8 @@ namespace gravel::detail {
 
 /// A sweep moves a light body m between heavy ones M to and fro, by P_k/m at contact k, and opens 2 m/M of
 /// what is missing. In all it moves each body i by the little that is left, d_i = sum of +-P_k n_k/m_i. An
-/// island goes on by as many of these as leave nothing of the missing g_k, in the mean over P_k:
+/// island of two contacts goes on by as many of these as leave nothing of the missing g_k, in the mean over
+/// P_k:
 ///
 ///     sum P_k g_k / sum m_i d_i^2,
 ///
