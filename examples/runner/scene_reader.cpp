@@ -1,3 +1,4 @@
+#include "../scenes/ring_layer.hpp"
 #include "../scenes/scenes.hpp"
 #include "material_reader.hpp"
 #include "scene.hpp"
@@ -161,10 +162,11 @@ void append(TableReader& reader, std::vector<SceneBody>& bodies, const SceneBody
   }
 }
 
-/// Runs a generator of `count` bodies unless its table has a fault already; what it refuses is one, too.
+/// Runs a generator of bodies, as many as `key` with this value says, unless its table has a fault already;
+/// what it refuses is one, too.
 template <class Generate>
-void generate(TableReader& reader, std::vector<SceneBody>& bodies, const SceneBody& look, std::size_t count,
-              Generate&& make) {
+void generate(TableReader& reader, std::vector<SceneBody>& bodies, const SceneBody& look, const char* key,
+              const std::string& value, Generate&& make) {
   if (!reader.isSound()) {
     return;
   }
@@ -173,8 +175,14 @@ void generate(TableReader& reader, std::vector<SceneBody>& bodies, const SceneBo
   } catch (const std::invalid_argument& error) {
     reader.faults().add(reader.where(), error.what());
   } catch (const std::bad_alloc&) {
-    reader.fault("count", std::to_string(count), "as many bodies as there is memory for");
+    reader.fault(key, value, "as many bodies as there is memory for");
   }
+}
+
+template <class Generate>
+void generate(TableReader& reader, std::vector<SceneBody>& bodies, const SceneBody& look, std::size_t count,
+              Generate&& make) {
+  generate(reader, bodies, look, "count", std::to_string(count), make);
 }
 
 std::uint64_t readSeed(TableReader& reader) {
@@ -249,6 +257,68 @@ void readGas(TableReader& reader, const MaterialReader& materials, bool enclosed
   look.surface = Surface::Smooth;
   readLook(reader, materials, look);
   generate(reader, bodies, look, count, [&] { return scenes::randomGas<double>(count, fraction, seed); });
+}
+
+/// Points that hold each other together, or spheres.
+void readCluster(TableReader& reader, const MaterialReader& materials, double G, const Domain<double>& domain,
+                 std::vector<SceneBody>& bodies) {
+  scenes::PlummerOptions options;
+  Vector3<double> position = Vector3<double>::Zero(), velocity = Vector3<double>::Zero();
+  double radius = 0.0;
+  reader.count("count", options.count, 1, mostBodies);
+  options.seed = readSeed(reader);
+  reader.real("mass", options.mass, positive());
+  reader.real("scaleRadius", options.scaleRadius, positive());
+  reader.vector("position", position);
+  reader.vector("velocity", velocity);
+  const bool understood = reader.real("bodyRadius", radius, notNegative()) || !reader.has("bodyRadius");
+  requireRoom(reader, "bodyRadius", understood, radius, domain);
+  if (!(G > 0.0)) {
+    reader.missing("gravity, which holds it together: give a \"G\" > 0 in [simulation]");
+  }
+  options.G = G;
+  SceneBody look;
+  look.surface = Surface::Glowing;
+  readLook(reader, materials, look);
+  generate(reader, bodies, look, options.count, [&] {
+    auto made = scenes::plummerSphere<double>(options);
+    for (Body<double>& body : made) {
+      body.position += position;
+      body.velocity += velocity;
+      body.radius = radius;
+    }
+    return made;
+  });
+}
+
+/// Fills the patch along x and y.
+void readRing(TableReader& reader, const MaterialReader& materials, const Domain<double>& domain,
+              bool domainIsKnown, std::vector<SceneBody>& bodies) {
+  scenes::RingLayerOptions options;
+  reader.real("opticalDepth", options.opticalDepth, positive());
+  options.seed = readSeed(reader);
+  readBodyRadius(reader, options.bodyRadius, domain);
+  reader.real("sizeExponent", options.sizeExponent, notNegative());
+  reader.interval("density", options.density, positive());
+  options.height = scenes::looseHeight(options.opticalDepth, options.bodyRadius[1]);
+  reader.real("height", options.height, positive());
+  reader.real("velocityDispersion", options.velocityDispersion, notNegative());
+  SceneBody look;
+  look.flow = true;
+  readLook(reader, materials, look);
+  const Vector3<double> lengths = domain.lengths();
+  if (domain.kind() != DomainKind::ShearPeriodic) {
+    if (domainIsKnown) {
+      reader.missing("patch: give a [domain] of kind \"shearPeriodic\"");
+    }
+    return;
+  }
+  if (const double most = lengths[2] - 2.0 * options.bodyRadius[1]; !(options.height <= most)) {
+    reader.fault("height", detail::formatReal(options.height),
+                 "at most the third length of the domain less a body, " + detail::formatReal(most));
+  }
+  generate(reader, bodies, look, "opticalDepth", detail::formatReal(options.opticalDepth),
+           [&] { return scenes::ringLayer<double>(options, lengths[0], lengths[1]); });
 }
 
 /// Of a plane or a box: what it is made of, and its colour.
@@ -443,6 +513,12 @@ Scene interpret(const toml::table& table, Faults& faults) {
              [&](TableReader& reader) { readColumn(reader, materials, scene.domain, scene.bodies); });
   top.tables("gas",
              [&](TableReader& reader) { readGas(reader, materials, enclosed, scene.domain, scene.bodies); });
+  top.tables("cluster", [&](TableReader& reader) {
+    readCluster(reader, materials, scene.config.G, scene.domain, scene.bodies);
+  });
+  top.tables("ring", [&](TableReader& reader) {
+    readRing(reader, materials, scene.domain, domainIsKnown, scene.bodies);
+  });
   bool flows = false;
   for (SceneBody& entry : scene.bodies) {
     if (entry.flow) {  // what is at rest lacks it
@@ -460,7 +536,9 @@ Scene interpret(const toml::table& table, Faults& faults) {
   top.table("picture", [&](TableReader& reader) { readPicture(reader, scene.picture); });
   top.finish();
   if (!faults.any() && scene.bodies.empty() && scene.config.bodyCount == 0) {
-    top.missing("bodies: give [[body]], [[cloud]], [[column]], [[gas]] or [simulation] bodyCount");
+    top.missing(
+        "bodies: give [[body]], [[cloud]], [[column]], [[gas]], [[cluster]], [[ring]] or [simulation] "
+        "bodyCount");
   }
   return scene;
 }

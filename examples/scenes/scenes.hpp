@@ -56,34 +56,35 @@ inline double powerLawRadius(Sequence& random, double low, double high, double e
   return std::clamp(radius, low, high);
 }
 
-/// Spheres placed one after the other, none overlapping another (random sequential addition). `period` > 0
-/// makes a cube of that side whose opposite faces are one.
+/// Spheres placed one after the other, none overlapping another (random sequential addition). Along an axis
+/// with a `period` > 0 what is one period apart is the same place.
 class Placement {
  public:
-  explicit Placement(double largestRadius, double period = 0.0)
-      : cell_(std::max(2.0 * largestRadius, 1e-300)), period_(period) {
-    if (period > 0.0) {
-      side_ = cellNumber(period);
-      if (side_ < 3) {
-        throw std::invalid_argument("scene: the box holds fewer than three of its largest spheres a side");
+  explicit Placement(double largestRadius, const Vector3<double>& period = Vector3<double>::Zero())
+      : cell_(Vector3<double>::Constant(std::max(2.0 * largestRadius, 1e-300))), period_(period) {
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      if (period[axis] > 0.0) {
+        side_[axis] = cellNumber(period[axis], axis);
+        if (side_[axis] < 3) {
+          throw std::invalid_argument("scene: the box holds fewer than three of its largest spheres a side");
+        }
+        cell_[axis] = period[axis] / static_cast<double>(side_[axis]);
       }
-      cell_ = period / static_cast<double>(side_);
     }
   }
 
   /// Takes the place if it is free.
   bool tryAdd(const Vector3<double>& x, double radius) {
-    const auto home = cellOf(x);
+    const Cell home = cellOf(x);
     for (std::int64_t k = 0; k < 27; ++k) {
-      const auto found =
-          cells_.find(keyOf({home[0] + k % 3 - 1, home[1] + k / 3 % 3 - 1, home[2] + k / 9 - 1}));
+      const auto found = cells_.find(keyOf(home + Cell(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1)));
       if (found == cells_.end()) {
         continue;
       }
       for (const Sphere& other : found->second) {
         Vector3<double> d = other.x - x;
-        if (period_ > 0.0) {
-          d -= period_ * (d / period_).array().round().matrix();
+        for (Eigen::Index axis = 0; axis < 3; ++axis) {
+          d[axis] -= period_[axis] > 0.0 ? period_[axis] * std::round(d[axis] / period_[axis]) : 0.0;
         }
         const double reach = other.radius + radius;
         if (d.squaredNorm() < reach * reach) {
@@ -110,38 +111,40 @@ class Placement {
   }
 
  private:
+  using Cell = Eigen::Matrix<std::int64_t, 3, 1>;
   struct Sphere {
     Vector3<double> x;
     double radius;
   };
 
   /// \throws std::invalid_argument where places have too few digits to tell spheres apart
-  std::int64_t cellNumber(double x) const {
-    const double number = std::floor(x / cell_);
+  std::int64_t cellNumber(double x, Eigen::Index axis) const {
+    const double number = std::floor(x / cell_[axis]);
     if (!(std::abs(number) <= 1e15)) {
       throw std::invalid_argument("scene: the region is more than 1e15 of its largest spheres wide");
     }
     return static_cast<std::int64_t>(number);
   }
 
-  std::array<std::int64_t, 3> cellOf(const Vector3<double>& x) const {
-    return {cellNumber(x[0]), cellNumber(x[1]), cellNumber(x[2])};
+  Cell cellOf(const Vector3<double>& x) const {
+    return {cellNumber(x[0], 0), cellNumber(x[1], 1), cellNumber(x[2], 2)};
   }
 
-  std::uint64_t keyOf(std::array<std::int64_t, 3> c) const {
+  std::uint64_t keyOf(Cell c) const {
     std::uint64_t key = 0;
-    for (std::int64_t k : c) {
-      if (period_ > 0.0) {
-        k = (k % side_ + side_) % side_;
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      std::int64_t& k = c[axis];
+      if (side_[axis] > 0) {
+        k = (k % side_[axis] + side_[axis]) % side_[axis];
       }
       key = (key << 21U) ^ (static_cast<std::uint64_t>(k + (1 << 20)) & 0x1FFFFFU);
     }
     return key;
   }
 
-  double cell_;
-  double period_;
-  std::int64_t side_ = 0;
+  Vector3<double> cell_;
+  Vector3<double> period_;
+  Cell side_ = Cell::Zero();  ///< cells of a period
   std::unordered_map<std::uint64_t, std::vector<Sphere>> cells_;
 };
 
@@ -214,12 +217,21 @@ std::vector<Body<S>> rubbleCloud(std::size_t count, std::uint64_t seed = 1) {
   return rubbleCloud<S>(options);
 }
 
-/// Plummer's sphere, G = M = a = 1, equal point masses, centre of mass at rest at the origin; velocities by
-/// rejection from the isotropic distribution function (Aarseth, Henon & Wielen 1974, A&A 37, 183).
+struct PlummerOptions {
+  std::size_t count = 1000;
+  std::uint64_t seed = 1;
+  double G = 1.0;            ///< [m^3 kg^-1 s^-2]
+  double mass = 1.0;         ///< [kg] of all
+  double scaleRadius = 1.0;  ///< [m] a: half of the mass is within 1.305 a
+};
+
+/// Plummer's sphere of equal point masses, centre of mass at rest at the origin; velocities by rejection from
+/// the isotropic distribution function (Aarseth, Henon & Wielen 1974, A&A 37, 183).
 template <Real S = double>
-std::vector<Body<S>> plummerSphere(std::size_t count, std::uint64_t seed = 1) {
-  Sequence random(seed);
-  std::vector<Body<S>> bodies(count);
+std::vector<Body<S>> plummerSphere(const PlummerOptions& options) {
+  Sequence random(options.seed);
+  const double speed = std::sqrt(options.G * options.mass / options.scaleRadius);
+  std::vector<Body<S>> bodies(options.count);
   for (Body<S>& body : bodies) {
     double r = 0.0;
     do {
@@ -233,12 +245,21 @@ std::vector<Body<S>> plummerSphere(std::size_t count, std::uint64_t seed = 1) {
     const double escape = std::sqrt(2.0 / std::sqrt(1.0 + r * r));
     const Vector3<double> x = r * random.direction();
     const Vector3<double> v = q * escape * random.direction();
-    body.position = x.cast<S>();
-    body.velocity = v.cast<S>();
-    body.mass = S(1.0 / static_cast<double>(count));
+    body.position = (options.scaleRadius * x).cast<S>();
+    body.velocity = (speed * v).cast<S>();
+    body.mass = S(options.mass / static_cast<double>(options.count));
   }
   centre(bodies);
   return bodies;
+}
+
+/// The same in units of its own: G = M = a = 1.
+template <Real S = double>
+std::vector<Body<S>> plummerSphere(std::size_t count, std::uint64_t seed = 1) {
+  PlummerOptions options;
+  options.count = count;
+  options.seed = seed;
+  return plummerSphere<S>(options);
 }
 
 /// Side of the cube in which `count` spheres of diameter 1 fill `fraction` of the volume.
@@ -251,7 +272,7 @@ inline double gasBoxLength(std::size_t count, double fraction) {
 template <Real S = double>
 std::vector<Body<S>> randomGas(std::size_t count, double fraction, std::uint64_t seed = 1) {
   const double side = gasBoxLength(count, fraction);
-  Placement placement(0.5, side);
+  Placement placement(0.5, Vector3<double>::Constant(side));
   Sequence place(seed, 0), motion(seed, 1);
   std::vector<Vector3<double>> velocities(count);
   Vector3<double> drift = Vector3<double>::Zero();
