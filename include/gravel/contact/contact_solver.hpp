@@ -253,6 +253,7 @@ class ContactSolver {
       sameNames_ = false;
     }
     names_.clear();
+    names_.reserve(memory.size());
     restored_.resize(memory.size(), true);
     listed_ = false;
     for (const StoredImpulse<S>& stored : memory) {

@@ -5,6 +5,7 @@
 
 #include <gravel/contact/contact.hpp>
 #include <gravel/contact/impact.hpp>
+#include <gravel/core/memory.hpp>
 
 #include <span>
 #include <vector>
@@ -15,8 +16,12 @@ namespace gravel {
 template <Real Scalar>
 class StepRecord {
  public:
-  /// A new step begins.
+  /// A new step begins. Room for impulses is kept from one step in several parts to the next one alone.
   void clear() {
+    if (entries_.empty()) {
+      detail::release(entries_);
+      detail::release(before_);
+    }
     entries_.clear();
     impacts_.clear();
     parts_ = 1;
