@@ -65,8 +65,8 @@ class Placement {
     for (Eigen::Index axis = 0; axis < 3; ++axis) {
       if (period[axis] > 0.0) {
         side_[axis] = cellNumber(period[axis], axis);
-        if (side_[axis] < 3) {
-          throw std::invalid_argument("scene: the box holds fewer than three of its largest spheres a side");
+        if (side_[axis] < 1) {
+          throw std::invalid_argument("scene: the box is narrower than its largest sphere");
         }
         cell_[axis] = period[axis] / static_cast<double>(side_[axis]);
       }

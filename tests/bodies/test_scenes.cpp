@@ -51,6 +51,23 @@ TEST_CASE("scenes: what is too wide for its spheres is refused", "[scenes]") {
   CHECK(scenes::grainColumn<double>(withRadius(column, 1e-6)).size() == 3);
 }
 
+// Seen to fail: fewer than 16 were refused, as in a box of fewer than three spheres a side.
+TEST_CASE("scenes: a gas of few spheres has none that overlap across its box", "[scenes]") {
+  const std::size_t count = GENERATE(1U, 2U, 3U, 4U, 7U, 12U, 15U, 40U);
+  const double side = scenes::gasBoxLength(count, 0.3);
+  const auto spheres = scenes::randomGas<double>(count, 0.3);
+  REQUIRE(spheres.size() == count);
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      Vector3<double> d = spheres[i].position - spheres[j].position;
+      d -= side * (d / side).array().round().matrix();
+      CHECK(d.norm() >= 1.0);
+    }
+  }
+  CHECK_THROWS_WITH(scenes::Placement(0.5, Vector3<double>(2.0, 0.9, 2.0)),
+                    "scene: the box is narrower than its largest sphere");
+}
+
 // Plummer (1911): potential energy -(3 pi/32) G M^2/a, kinetic energy half of its size, half of the mass
 // within 1.305 a. Of n = 4000 stars each is off by a few 1/sqrt(n) = 0.016; the part beyond 100 a that is
 // left out, and what a star has with itself, are less than 1e-3.
