@@ -44,7 +44,7 @@ std::string sceneTime(double time, const Units& units) {
   if (units.time != "s") {
     return format("%.5g %s", time, units.time.c_str());
   }
-  return inUnit<6>(time, {{{1e-6, "us"}, {1e-3, "ms"}, {1, "s"}, {60, "min"}, {3600, "h"}, {86400, "days"}}});
+  return inUnit<6>(time, {{{1e-6, "us"}, {1e-3, "ms"}, {1, "s"}, {60, "min"}, {3600, "h"}, {86400, "d"}}});
 }
 
 std::string sceneLength(double length, const Units& units) {

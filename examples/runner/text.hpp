@@ -21,7 +21,7 @@ std::string format(const char* pattern, Args... args) {
 /// Seconds of the clock on the wall: "8 s", "3 min 20 s", "2 h 5 min", "1e+20 years".
 std::string wallTime(double seconds);
 
-/// A time of the scene: in SI units "250 ms", "2.5 h", "3.2 days"; else with the scene's own unit.
+/// A time of the scene: in SI units "250 ms", "2.5 h", "3.2 d"; else with the scene's own unit.
 std::string sceneTime(double time, const Units& units);
 
 /// A length of the scene: in SI units "12 mm", "3.4 km"; else with the scene's own unit.
