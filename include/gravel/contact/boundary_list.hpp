@@ -66,7 +66,7 @@ class BoundaryList {
     wallSkin_ = skin;
     // The bodies' skin in full: half of it may be used up already when a boundary asks for this search.
     const S room = margin + skin + wallSkin_;
-    const S slack = S(1) + S(16) * Eigen::NumTraits<S>::epsilon();
+    const S slack = S(1) + S(16) * detail::roundoff<S>();
     const std::size_t n = walls.empty() ? 0 : positions.size();
     parts_.resize((n + chunk - 1) / chunk);
     parallelForChunks(n, chunk, [&](std::size_t begin, std::size_t end) {

@@ -129,7 +129,7 @@ template <Real Scalar>
 [[gnu::always_inline]] inline Touch<Scalar> touchAt(const Vector3<Scalar>& r_12, const Scalar& distance,
                                                     const Scalar& r1, const Scalar& reach, std::uint64_t id1,
                                                     std::uint64_t id2, const Scalar& epsilon) {
-  const Scalar near = std::min(epsilon, Scalar(Scalar(16) * Eigen::NumTraits<Scalar>::epsilon() * reach));
+  const Scalar near = std::min(epsilon, Scalar(Scalar(16) * detail::roundoff<Scalar>() * reach));
   const bool coincident = !(distance > Scalar(0)) || distance <= near;
   const Scalar arm1 = distance * (r1 / reach);
   return Touch<Scalar>{

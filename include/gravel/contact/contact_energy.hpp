@@ -58,7 +58,7 @@ class ContactEnergy {
   struct Gain {
     S sum = S(0);   ///< of energy
     S size = S(0);  ///< of the terms that add up to it
-    bool isReal() const { return sum > S(8) * Eigen::NumTraits<S>::epsilon() * size; }  // no rounding
+    bool isReal() const { return sum > S(8) * detail::roundoff<S>() * size; }  // no rounding
   };
   struct Run {
     std::uint32_t island;

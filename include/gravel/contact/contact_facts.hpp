@@ -45,9 +45,9 @@ struct ContactKinds {
 template <Real S>
 struct ContactFacts {
   ContactKinds kinds;
-  S overlap = S(0);                           ///< [m] the largest
-  S radius = Eigen::NumTraits<S>::highest();  ///< [m] the smallest
-  std::size_t others = 0;                     ///< that are not those of before, in their places
+  S overlap = S(0);                 ///< [m] the largest
+  S radius = detail::highest<S>();  ///< [m] the smallest
+  std::size_t others = 0;           ///< that are not those of before, in their places
 
   /// All but its kind. \param r the smaller of its radii  \param before its name is the one of before
   void include(const Contact<S>& c, const S& r, bool before) {

@@ -99,7 +99,7 @@ ContactOutcomes<S> decideContacts(const ContactView<S>& contacts, B& bodies, con
     const S sizes = detail::maxAbs(detail::velocityOf(bodies, c.first)) +
                     detail::maxAbs(detail::velocityOf(bodies, c.second)) +
                     h * (detail::maxAbs(a1) + detail::maxAbs(a2));
-    const S noise = S(16) * Eigen::NumTraits<S>::epsilon() * sizes;
+    const S noise = S(16) * detail::roundoff<S>() * sizes;
     const S rest = stands(c.first) && stands(c.second)
                        ? std::max<S>(relative, held(c.first, c.normal) + held(c.second, c.normal))
                        : relative;

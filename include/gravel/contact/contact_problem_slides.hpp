@@ -70,7 +70,7 @@ inline auto ContactProblem<S>::wrongAt(const Group& group, const Lanes& present,
     return wrong;
   }
   const auto open = changes.slides & !sliding.kinetic & (row.stick > row.slide);
-  return choose(open, Pack::all(Eigen::NumTraits<S>::highest()), wrong);
+  return choose(open, Pack::all(detail::highest<S>()), wrong);
 }
 
 template <Real S>
@@ -183,7 +183,7 @@ bool ContactProblem<S>::slid(std::size_t k, const S& kineticFriction) const {
   }
   const S limit_sq = kineticFriction * kineticFriction;
   const S off = Vector3<S>(last_->tangential(k) / jn).squaredNorm() - limit_sq;
-  return detail::sizeOf<S>(off) <= S(128) * Eigen::NumTraits<S>::epsilon() * limit_sq;
+  return detail::sizeOf<S>(off) <= S(128) * detail::roundoff<S>() * limit_sq;
 }
 
 template <Real S>

@@ -30,7 +30,7 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   step_ = dt;
   bends = way.follows && !way.bend.empty();
   angle_ = way.frame * dt / S(2);
-  this->mostLoad_ = Eigen::NumTraits<S>::highest();
+  this->mostLoad_ = detail::highest<S>();
   kept = false;
   detail::resizeSparingly(rows, contacts.size());
   detail::resizeSparingly(marks, contacts.size());

@@ -107,7 +107,7 @@ bool mayRest(const NarrowPhaseSettings<S>& settings, const ContactKeys& keys, Re
 template <Real S>
 bool mayBegin(const NarrowPhaseSettings<S>& settings, const S& gap, const S& radii, const S& approach,
               const S& acceleration) {
-  return settings.slow && (!(gap > S(16) * Eigen::NumTraits<S>::epsilon() * radii) ||
+  return settings.slow && (!(gap > S(16) * roundoff<S>() * radii) ||
                            !(S(2) * (approach - *settings.slow) > S(3) * acceleration * settings.step));
 }
 

@@ -4,6 +4,7 @@
 /// What one asks of a contact solver, and what it answers.
 
 #include <gravel/core/check.hpp>
+#include <gravel/core/sizes.hpp>
 #include <gravel/core/types.hpp>
 
 #include <algorithm>
@@ -54,7 +55,7 @@ void limitSweeps(ContactSettings<S>& settings, std::size_t most, std::size_t con
   settings.islandTolerance = most == 0 ? settings.tolerance : S(0);
   settings.remembers = remembers;
   if (most == 0 && !remembers) {
-    const S least = std::min<S>(settings.tolerance, Eigen::NumTraits<S>::epsilon());
+    const S least = std::min<S>(settings.tolerance, detail::roundoff<S>());
     settings.tolerance = std::max<S>(S(0.01) * settings.tolerance, least);
   }
   const std::size_t looks = remembers ? usualLooks : 1'000'000;

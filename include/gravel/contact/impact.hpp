@@ -149,7 +149,7 @@ Vector3<S> spinByTorque(const B& bodies, std::size_t i, const S& t, const S& h) 
 /// [m s^-1] Rounding of speeds along n: what common motion, and what motion across n, brings into it.
 template <Real S>
 S noiseAlong(const Vector3<S>& n, const Vector3<S>& v1, const Vector3<S>& v2, const Vector3<S>& v_rel) {
-  return S(16) * Eigen::NumTraits<S>::epsilon() *
+  return S(16) * roundoff<S>() *
          (sumAbs(Vector3<S>(n.cwiseProduct(v1))) + sumAbs(Vector3<S>(n.cwiseProduct(v2))) + maxAbs(v_rel));
 }
 

@@ -137,7 +137,7 @@ class IslandSweeps : private RowImpulses<S> {
       own.tolerance = own.islandTolerance;
       limitSweeps(own, 0, island.rows, own.remembers && island.remembers);
     }
-    island.enough = std::max<S>(own.tolerance, S(8) * Eigen::NumTraits<S>::epsilon()) * island.approach;
+    island.enough = std::max<S>(own.tolerance, S(8) * roundoff<S>()) * island.approach;
     island.course = SweepCourse<S>(island.enough, own.maxIterations, settings_.accelerate);
   }
 
@@ -170,7 +170,7 @@ class IslandSweeps : private RowImpulses<S> {
           speed, std::max<S>(maxAbs(problem_.initial[ends.slot1].v), maxAbs(problem_.initial[ends.slot2].v)));
     }
     for (Island& island : islands_) {
-      const S rounding = Eigen::NumTraits<S>::epsilon() * island.speed;
+      const S rounding = roundoff<S>() * island.speed;
       island.course.allow(rounding);
       if (problem_.again && !island.ended && !(island.now.change_sq > rounding * rounding)) {
         keep(island);

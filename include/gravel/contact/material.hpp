@@ -4,6 +4,7 @@
 /// What two surfaces do to each other: coefficients of a pair.
 
 #include <gravel/core/check.hpp>
+#include <gravel/core/sizes.hpp>
 
 #include <string>
 
@@ -93,7 +94,7 @@ Scalar fractionalPower(const Scalar& x, const Scalar& y) {
     Scalar root = x;
     Scalar rest = y;
     Scalar digit = Scalar(1);
-    while (rest > Scalar(0) && digit > Eigen::NumTraits<Scalar>::epsilon() * Scalar(0.25)) {
+    while (rest > Scalar(0) && digit > roundoff<Scalar>() * Scalar(0.25)) {
       root = Scalar(sqrt(root));
       digit = digit / Scalar(2);
       if (rest >= digit) {

@@ -217,7 +217,7 @@ class NarrowPhase {
       return false;  // the common case, before anything else is loaded
     }
     // A root is taken only where rounding could matter.
-    const S near = (S(1) - S(16) * Eigen::NumTraits<S>::epsilon()) * (reach + settings.margin);
+    const S near = (S(1) - S(16) * detail::roundoff<S>()) * (reach + settings.margin);
     const bool surely = distance_sq < near * near;
     const S distance = surely ? S(0) : detail::safeNorm(r_ij);
     const bool overlaps = surely || distance < reach + settings.margin;

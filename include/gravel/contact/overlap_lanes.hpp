@@ -139,7 +139,7 @@ template <Real S>
   const PackedVector<S> r = contact.distance * contact.n + d;
   const P distance = safeNorm(r);
   const auto pair = !wall;
-  const auto turned = pair & (distance > P::all(Eigen::NumTraits<S>::epsilon()) * reach) & (distance > zero);
+  const auto turned = pair & (distance > P::all(roundoff<S>()) * reach) & (distance > zero);
   const PackedVector<S> n = choose(turned, one / choose(turned, distance, one) * r, contact.n);
   const P missing = reach - choose(wall, contact.n.dot(d), distance);
   const auto opens = (missing > zero) & (shares.first + shares.second > zero);

@@ -136,7 +136,7 @@ class PositionalCorrection {
     S enough = S(0);
     int most = 1;
     int sweeps = 0;
-    S before = Eigen::NumTraits<S>::highest();  ///< largest move of the last sweep that was looked at
+    S before = detail::highest<S>();  ///< largest move of the last sweep that was looked at
 
     bool goesOn(const S& largest) {
       ++sweeps;
@@ -152,7 +152,7 @@ class PositionalCorrection {
   struct Island {
     std::uint32_t rows = 0;
     S overlap = S(0);
-    S radius = Eigen::NumTraits<S>::highest();
+    S radius = detail::highest<S>();
     S right = S(0);
     Course course;
     Opened now;

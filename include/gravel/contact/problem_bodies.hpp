@@ -55,7 +55,7 @@ class ProblemBodies {
   bool isScaled() const { return speedExponent_ != 0 || massExponent_ != 0; }
   S energyOut(const S& e) const { return scaled<S>(e, -2 * speedExponent_ - massExponent_); }
   /// Changes of velocities below that are none.
-  S roundingOfSpeeds() const { return Eigen::NumTraits<S>::epsilon() * fastest_; }
+  S roundingOfSpeeds() const { return roundoff<S>() * fastest_; }
   S speedIn(const S& v) const { return scaled<S>(v, speedExponent_); }
   Vector3<S> speedIn(const Vector3<S>& v) const { return scaled<S>(v, speedExponent_); }
   Packed<S> speedIn(const Packed<S>& v) const { return scaledLanes(v, speedExponent_); }
@@ -89,7 +89,7 @@ class ProblemBodies {
     });
     turns_ = scales.mostTurn > turningShare<S>() * scales.leastFall;
     const bool wasAgain = again;
-    const S tooMuch = S(1) / Eigen::NumTraits<S>::epsilon();
+    const S tooMuch = S(1) / roundoff<S>();
     again = again && scales.others == 0 &&
             !(ratio * scales.change > tooMuch * scaled<S>(scales.fastest, speedExponent_));
     const int speedExponent = speedExponent_;

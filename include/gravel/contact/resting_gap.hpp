@@ -45,7 +45,7 @@ struct RestingGap {
                                                          const S& dt, const S& gapStep) {
     const P open = choose(gap > P::zero(), gap, P::zero());
     if (!(dt > S(0))) {
-      return choose(open > P::zero(), P::all(Eigen::NumTraits<S>::highest()), P::zero());
+      return choose(open > P::zero(), P::all(highest<S>()), P::zero());
     }
     const P closed = P::all(restingMargin<S>() / S(64)) * radii;
     const S longer = std::max<S>(dt, gapStep);

@@ -115,7 +115,7 @@ struct RowImpulses {
     bool right = true;
     if (!problem.turning.empty() && !turned.right[0]) {
       const S speed = maxAbs(b1.s.at(0)) + maxAbs(b2.s.at(0)) + maxAbs(b1.v.at(0)) + maxAbs(b2.v.at(0));
-      const S enough = Eigen::NumTraits<S>::epsilon() * speed;
+      const S enough = roundoff<S>() * speed;
       const Pack change_sq = largerOf(changes.du.squaredNorm(), turned.d_rho.squaredNorm());
       right = !(change_sq[0] > enough * enough);
     }

@@ -202,7 +202,7 @@ template <Real S>
 struct RowSlides {
   typename Packed<S>::Truth kinetic;  ///< what cuts friction is the kinetic limit; in others the static one
   typename Packed<S>::Truth tired;    ///< that have begun to too often: they go on, since sweeps must end
-  Packed<S> mostLoad = Packed<S>::all(Eigen::NumTraits<S>::highest());  ///< friction is by no more than this
+  Packed<S> mostLoad = Packed<S>::all(highest<S>());  ///< friction is by no more than this
   /// Of fast ones, else zero: slip and turn across n before the kick. What slides is held against the mean of
   /// these and what is left, since it may turn in between: contact_problem_way.hpp.
   PackedVector<S> slipBefore = PackedVector<S>::zero();

@@ -84,7 +84,7 @@ class SequentialImpulses : private detail::RowImpulses<S> {
       problem.release(colouring, first, problem.rows.size());
       return {};
     }
-    const S rounding = S(8) * Eigen::NumTraits<S>::epsilon();
+    const S rounding = S(8) * detail::roundoff<S>();
     const S enough = std::max<S>(std::max<S>(settings.tolerance, rounding) * problem.largestApproach,
                                  problem.roundingOfSpeeds());
     // What is only just content would never become better, and a heap at rest creep by it.

@@ -110,7 +110,7 @@ GripImpulses<Scalar> gripImpulses(const detail::SlipAndTurn<Scalar>& mobility, c
   j = clampToCone<Scalar>(sticking, jn, mu_k, mu_k);
   for (int turn = 0; turn < 200; ++turn) {
     const V next = clampToCone<Scalar>(rubs(within(turns(j))), jn, mu_k, mu_k);
-    const bool stays = detail::maxAbs(V(next - j)) <= Eigen::NumTraits<Scalar>::epsilon() * mu_s * jn;
+    const bool stays = detail::maxAbs(V(next - j)) <= detail::roundoff<Scalar>() * mu_s * jn;
     j = next;
     if (stays) {
       break;

@@ -79,7 +79,7 @@ struct ProblemScales {
   S heaviest = S(0);
   S mostFall = S(0);
   std::size_t others = 0;
-  S leastFall = Eigen::NumTraits<S>::highest();
+  S leastFall = highest<S>();
   S mostTurn = S(0);
   ProblemScales& operator+=(const ProblemScales& other) {
     leastFall = std::min<S>(leastFall, other.leastFall);

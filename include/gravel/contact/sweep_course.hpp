@@ -104,7 +104,7 @@ class SweepCourse {
   S leapAfter(const SweepProgress<S>& now) const {
     const bool oneWay = now.along * now.along > S(1 - 1e-6) * (now.size * before_);
     const S left = before_ - now.along;
-    const bool isKnown = left > S(16) * Eigen::NumTraits<S>::epsilon() * before_;
+    const bool isKnown = left > S(16) * roundoff<S>() * before_;
     return oneWay && now.along > S(0) && isKnown ? S(now.along / left) : S(0);
   }
 
@@ -117,7 +117,7 @@ class SweepCourse {
   bool bare_ = false;  ///< that one had no share
   S leap_ = S(0);
   bool mayLeap_ = false;
-  S changeAtLeap_ = Eigen::NumTraits<S>::highest();  ///< at the last one
+  S changeAtLeap_ = highest<S>();  ///< at the last one
 };
 
 }  // namespace gravel::detail

@@ -87,7 +87,7 @@ namespace detail {
 /// \param reach [m] sum of the radii  \param size [m] of what the gap is computed from
 template <Real Scalar>
 Scalar gapRounding(const RelativeFlight<Scalar>& flight, const Scalar& reach, const Scalar& size) {
-  const Scalar ulps = Scalar(8) * Eigen::NumTraits<Scalar>::epsilon();
+  const Scalar ulps = Scalar(8) * roundoff<Scalar>();
   return ulps * size +
          std::min<Scalar>(ulps * flight.far / Scalar(2), restingMargin<Scalar>() * reach / Scalar(8));
 }

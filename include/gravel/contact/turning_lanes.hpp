@@ -147,7 +147,7 @@ struct TurningLanes {
       const V dt_most = cut(sticks, limit, limit, mass * reciprocalOf(m.slip), u0) - row.jt;
       const V beside = l - per_C * (rho_t + m.both * row.n.cross(dt_most));
       const V dl_most = cut(beside, mostTurn, mostTurn, mass * per_C, rho0) - l;
-      const P little = P::all(S(8) * Eigen::NumTraits<S>::epsilon()) * mostTurn;
+      const P little = P::all(S(8) * roundoff<S>()) * mostTurn;
       const auto same = !((dl_most - dl).squaredNorm() > little * little);
       right = (changes.slides & (rolls | same)) | right;
       dt = choose(changes.slides, choose(rolls, dt_slides, dt_most), dt);

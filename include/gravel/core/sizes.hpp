@@ -51,6 +51,24 @@ Scalar roundoff() {
   }
 }
 
+/// The largest number, or of a user's scalar without numeric_limits a power of two times that of double that
+/// is near it.
+template <Real Scalar>
+Scalar highest() {
+  if constexpr (std::numeric_limits<Scalar>::is_specialized) {
+    return Scalar(std::numeric_limits<Scalar>::max());
+  } else {
+    static const double most = [] {
+      double x = std::numeric_limits<double>::max();
+      while (!(Scalar(Scalar(x) / Scalar(2)) < Scalar(x))) {  // an infinity is its half
+        x /= 2;
+      }
+      return x;
+    }();
+    return Scalar(most);
+  }
+}
+
 /// Largest |coefficient|.
 template <Real Scalar>
 Scalar maxAbs(const Vector3<Scalar>& v) {

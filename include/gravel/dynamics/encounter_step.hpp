@@ -237,7 +237,7 @@ Scalar stepFromEncounters(const Bodies<Scalar, Layout>& bodies, const Scalar& G,
     approach = domain.isOpen() ? meets : approach;
   } else if (domain.isOpen() && detail::haveUnlikeMasses<S>(bodies)) {
     pairs.emplace(bodies);
-    sum = pairs->of(detail::EncounterRate<S>{S(G), T, S(softening)}, Eigen::NumTraits<S>::highest());
+    sum = pairs->of(detail::EncounterRate<S>{S(G), T, S(softening)}, detail::highest<S>());
   }
   S h = S(limits.largest) / detail::eighthRoot(S(S(1) + sum));
   const S longest = S(limits.contactSteps) * T;  // over the square root of an approach

@@ -106,7 +106,7 @@ struct EncounterRate {
   S bound(const PairBounds<S>& a, const PairBounds<S>& b) const {
     const S mass = a.heaviest + b.heaviest;
     const S s = a.apart(b).squaredNorm() + softening * softening;
-    const S none = (a.free || b.free) && mass > S(0) ? Eigen::NumTraits<S>::highest() : S(0);
+    const S none = (a.free || b.free) && mass > S(0) ? highest<S>() : S(0);
     return none > S(0) && s > S(0) ? rate(mass, s, a.speed(b)) : none;
   }
 

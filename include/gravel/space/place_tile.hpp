@@ -76,7 +76,7 @@ struct PlaceTile {
     if (!body.isFixed()) {
       return m;
     }
-    return m > Scalar(0) ? Scalar(-m) : Scalar(-Eigen::NumTraits<Scalar>::highest());
+    return m > Scalar(0) ? Scalar(-m) : Scalar(-highest<Scalar>());
   }
 };
 
