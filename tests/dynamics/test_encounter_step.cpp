@@ -178,6 +178,33 @@ TEST_CASE("Tracers that are near each other ask for nothing, in a scalar of floa
   CHECK(stepFromEncounters(made(list), S(1), S(0), StepLimits<S>{S(0.02), S(0), S(1)}) == S(1));
 }
 
+// 1e-15 kg in a circle of 2e-7 m, alone, and among so many tracers that the closest pair is searched. Seen to
+// fail: no distance below 5.6e-7 m, and a square of G m T^2 that is 0 (80 steps); among many 0.01, since no
+// rate was above the highest number, which Eigen takes for 0.
+TEMPLATE_TEST_CASE("Specks that circle each other have their 314 steps a turn, in a user's scalar, too", "",
+                   MinimalReal, MinimalRealOf<float>) {
+  using S = TestType;
+  const double G = 6.6743e-11;
+  const double r = 2e-7;
+  const double v = std::sqrt(2e-15 * G / r);
+  const double turn = 2 * 3.14159265358979324 * r / v;
+  for (const std::size_t n : {std::size_t(2), std::size_t(200)}) {
+    std::vector<Body<S>> list(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      list[i].position = {S(i < 2 ? 0.0 : 1.0), S(i == 1 ? r : 0.0), S(0)};
+      list[i].velocity = {S(i == 1 ? v : 0.0), S(0), S(0)};
+      list[i].mass = S(i < 2 ? 1e-15 : 0.0);
+    }
+    if (n > 2) {
+      list[0].mass = S(2e-15 - 1e-25);  // unlike
+      list[1].mass = S(1e-25);
+    }
+    const S h = stepFromEncounters(made(list), S(G), S(0), StepLimits<S>{S(0.02), S(0), S(100 * turn)});
+    CAPTURE(n);
+    CHECK_THAT(turn / h.inTest(), WithinRel(314.159, 1e-4));
+  }
+}
+
 // Many bodies: each with the partner that its acceleration tells of. For a Plummer sphere that is within a
 // factor of the closest pairs; here against all pairs of the same bodies.
 TEST_CASE("Above the limit the likeliest partners give a step near that of all pairs") {

@@ -70,6 +70,7 @@ class EncounterTable {
   void look(const S& G, const S& softening, const S& T, S& sum, S& approach) const {
     using std::sqrt;
     const S T_sq = T * T;
+    const S nearest = nearestSquared<S>();
     Column s, speed_sq, a, b;
     for (Eigen::Index i = 0; i + 1 < n_; ++i) {
       const Eigen::Index k = n_ - i - 1;
@@ -92,13 +93,14 @@ class EncounterTable {
       }
       s += softening * softening;
       // Two points in one place do not pull each other.
-      s = (s > S(0)).select(s.max(nearestSquared<S>()).inverse(), Column::Constant(k, S(0)));
+      s = (s > S(0)).select(s.max(nearest).inverse(), Column::Constant(k, S(0)));
       a = speed_sq * s * T_sq;
-      b = ((m_.tail(k) + m_[i]) * (G * T_sq)).square() * (s * s * s);
+      b = (m_.tail(k) + m_[i]) * (G * T_sq) * s;
+      b *= b * s;  // the cube of s alone may be out of range
       if (free_[i] == S(0)) {
         b *= free_.tail(k);
       }
-      sum += (b * (a * a + b)).sum() / S(2);
+      sum += (b * a * a + b * b).sum() / S(2);
     }
   }
 

@@ -25,10 +25,12 @@ struct PairMember {
   bool free;
 };
 
-/// [m^2] No distance counts as less, so that its sixth power stays in range.
+/// [m^2] No distance counts as less, so that the square of its reciprocal stays in range: 9e-78 m, and 3e-10
+/// m in a user's scalar of float's range.
 template <class S>
 S nearestSquared() {
-  return leastWithCube<S>();
+  using std::sqrt;
+  return S(1) / sqrt(highest<S>());
 }
 
 /// 0 where there is none.
@@ -96,6 +98,7 @@ struct EncounterRate {
   S G;          ///< [m^3 kg^-1 s^-2]
   S T;          ///< [s]
   S softening;  ///< [m]
+  S nearest = nearestSquared<S>();
 
   S of(const PairMember<S>& a, const PairMember<S>& b) const {
     const S touching = a.r + b.r;
@@ -112,11 +115,11 @@ struct EncounterRate {
 
  private:
   S rate(const S& mass, const S& s, const Vector3<S>& v) const {
-    const S near = S(1) / std::max<S>(s, nearestSquared<S>());
+    const S near = S(1) / std::max<S>(s, nearest);
     const S fly = v.squaredNorm() * near * T * T;
-    const S pull = mass * G * T * T;
-    const S fall = pull * pull * near * near * near;
-    return fall * (fly * fly + fall) / S(2);
+    const S pull = mass * G * T * T * near;
+    const S fall = pull * pull * near;  // in this order neither the cube of near nor pull^2 need be in range
+    return (fall * fly * fly + fall * fall) / S(2);
   }
 };
 
