@@ -141,18 +141,19 @@ TEST_CASE("Accelerations beyond a scalar's range ask for nothing, rather than fo
   CHECK(PileStep<float>{}.longest(bodies, contacts) > 0.0F);
 }
 
-// Seen to ask for nothing: the sum of masses times diameters was beyond a float's range.
-TEST_CASE("Two suns that touch ask for a step in single precision as in double precision") {
-  const auto longest = [](auto scalar) {
+// Seen to ask for nothing: suns, whose sum of masses times diameters was beyond a float's range; dust of
+// 1e-18 kg, whose masses times the squares of accelerations were below it.
+TEST_CASE("Two suns or grains of dust that touch ask for a step in single as in double precision") {
+  const auto longest = [](auto scalar, double mass, double radius, double acceleration) {
     using S = decltype(scalar);
     Bodies<S> bodies;
     for (const int side : {-1, 1}) {
       Body<S> sun;
-      sun.position = {S(7e8 * side), S(0), S(0)};
-      sun.mass = S(2e30);
-      sun.radius = S(7e8);
+      sun.position = {S(radius * side), S(0), S(0)};
+      sun.mass = S(mass);
+      sun.radius = S(radius);
       bodies.add(sun);
-      bodies[bodies.size() - 1].acceleration() = Vector3<S>(S(-68.1 * side), S(0), S(0));
+      bodies[bodies.size() - 1].acceleration() = Vector3<S>(S(-acceleration * side), S(0), S(0));
     }
     ContactList<S> contacts{{}, {{.material = {.staticFriction = S(0.4)}}}};
     Contact<S> c{};
@@ -161,5 +162,6 @@ TEST_CASE("Two suns that touch ask for a step in single precision as in double p
     contacts.contacts.push_back(c);
     return PileStep<S>{}.longest(bodies, contacts);
   };
-  CHECK_THAT(longest(1.0F), WithinRel(longest(1.0), 1e-5));
+  CHECK_THAT(longest(1.0F, 2e30, 7e8, 68.1), WithinRel(longest(1.0, 2e30, 7e8, 68.1), 1e-5));
+  CHECK_THAT(longest(1.0F, 1e-18, 5e-8, 6.7e-15), WithinRel(longest(1.0, 1e-18, 5e-8, 6.7e-15), 1e-5));
 }

@@ -37,25 +37,12 @@ class PileStep {
     }
     islands_.find(contacts.contacts, bodies);
     piles_.assign(bodies.size(), Pile{});
-    const auto each = [&](auto&& f) {
-      for (std::size_t i = 0; i < bodies.size(); ++i) {
-        if (detail::isMovable(bodies, i)) {
-          f(piles_[islands_.of(i)], Scalar(bodies.masses()[i]), i);
-        }
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      if (detail::isMovable(bodies, i)) {
+        piles_[islands_.of(i)].add(Scalar(bodies.masses()[i]), Scalar(bodies.radii()[i]),
+                                   Vector3<Scalar>(bodies.accelerations()[i]));
       }
-    };
-    each([&](Pile& pile, const Scalar& m, std::size_t i) {
-      ++pile.count;
-      pile.mass += m;
-      pile.a += m * Vector3<Scalar>(bodies.accelerations()[i]);
-    });
-    each([&](Pile& pile, const Scalar& m, std::size_t i) {
-      if (pile.count > 1) {
-        // By shares: the mass of a sun times its diameter is no float.
-        pile.d += m / pile.mass * Scalar(2) * Scalar(bodies.radii()[i]);
-        pile.a_sq += m * (Vector3<Scalar>(bodies.accelerations()[i]) - pile.a / pile.mass).squaredNorm();
-      }
-    });
+    }
     for (const Contact<Scalar>& c : contacts) {
       if (detail::isMovable(bodies, c.first)) {
         Pile& pile = piles_[islands_.of(c.first)];
@@ -65,7 +52,7 @@ class PileStep {
     }
     for (const Pile& pile : piles_) {
       if (pile.a_sq > Scalar(0)) {
-        const Scalar g = sqrt(Scalar(Scalar(5) / Scalar(3) * (pile.a_sq / pile.mass)));
+        const Scalar g = sqrt(Scalar(Scalar(5) / Scalar(3) * pile.a_sq));
         const Scalar rough = pile.roughness / Scalar(static_cast<double>(pile.contacts));
         const Scalar parts = Scalar(50) / (Scalar(3) + Scalar(2) * rough);  // 10 to 17
         const Scalar h = sqrt(Scalar(pile.d / g)) / parts;
@@ -76,14 +63,24 @@ class PileStep {
   }
 
  private:
+  /// Means by mass, of the bodies so far: neither m |a|^2 of a grain of dust nor m d of a sun is a float.
   struct Pile {
-    std::size_t count = 0;
     std::size_t contacts = 0;  ///< of movable first bodies: not none where there are two bodies
     Scalar mass = Scalar(0);
-    Vector3<Scalar> a = Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(0));  ///< sum of m a
-    Scalar d = Scalar(0);                                                  ///< mean of d by mass
-    Scalar a_sq = Scalar(0);                                               ///< sum of m |a - a_cm|^2
-    Scalar roughness = Scalar(0);                                          ///< sum over contacts
+    Vector3<Scalar> a = Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(0));
+    Scalar d = Scalar(0);
+    Scalar a_sq = Scalar(0);       ///< |a - a_cm|^2; 0 of one body
+    Scalar roughness = Scalar(0);  ///< sum over contacts
+
+    /// West 1979, Communications of the ACM 22, 532.
+    void add(const Scalar& m, const Scalar& r, const Vector3<Scalar>& its) {
+      mass += m;
+      const Scalar share = m / mass;
+      const Vector3<Scalar> off = its - a;
+      a += share * off;
+      d += share * (Scalar(2) * r - d);
+      a_sq += share * ((Scalar(1) - share) * off.squaredNorm() - a_sq);
+    }
   };
 
   /// 0 without friction to 1 where there is enough of it for a pile to rest in the longer steps.
