@@ -20,18 +20,19 @@ namespace gravel {
 /// work N d, friction across it none.
 template <Real Scalar>
 struct ContactVirial {
-  Scalar motion = Scalar(0);      ///< 2 T, twice the kinetic energy about the centre of mass
-  Scalar forces = Scalar(0);      ///< sum F.x of gravity, field and the user's force; -|W| for gravity alone
-  Scalar contacts = Scalar(0);    ///< sum N d of pairs: normal force times distance of the centres
-  Scalar boundaries = Scalar(0);  ///< sum F.x of boundaries and fixed bodies on what they hold
+  using Wide = detail::AtLeastDouble<Scalar>;  // the energy of dust is no float
+  Wide motion = Wide(0);                       ///< 2 T, twice the kinetic energy about the centre of mass
+  Wide forces = Wide(0);      ///< sum F.x of gravity, field and the user's force; -|W| for gravity alone
+  Wide contacts = Wide(0);    ///< sum N d of pairs: normal force times distance of the centres
+  Wide boundaries = Wide(0);  ///< sum F.x of boundaries and fixed bodies on what they hold
 
   /// I''/2: how fast a heap that should rest expands or falls together.
-  Scalar sum() const { return motion + forces + contacts + boundaries; }
+  Wide sum() const { return motion + forces + contacts + boundaries; }
   /// |sum| over the largest term; 0 where there is nothing.
   Scalar residual() const {
-    const Scalar scale = std::max({detail::sizeOf(motion), detail::sizeOf(forces), detail::sizeOf(contacts),
-                                   detail::sizeOf(boundaries)});
-    return scale > Scalar(0) ? Scalar(detail::sizeOf(sum()) / scale) : Scalar(0);
+    const Wide scale = std::max({detail::sizeOf(motion), detail::sizeOf(forces), detail::sizeOf(contacts),
+                                 detail::sizeOf(boundaries)});
+    return scale > Wide(0) ? Scalar(detail::sizeOf(sum()) / scale) : Scalar(0);
   }
 };
 
@@ -45,9 +46,11 @@ struct SupportedWeight {
   /// |load - weight| along the field over the weight; 0 without a field. A heap that moves inside is off by
   /// the acceleration of its centre of mass.
   Scalar residual() const {
-    const Scalar w_sq = weight.squaredNorm();
-    const Scalar missing = weight.dot(Vector3<Scalar>(load - weight));
-    return w_sq > Scalar(0) ? Scalar(detail::sizeOf(missing) / w_sq) : Scalar(0);
+    using Wide = detail::AtLeastDouble<Scalar>;
+    const Vector3<Wide> w = weight.template cast<Wide>();
+    const Wide missing = w.dot(Vector3<Wide>(load.template cast<Wide>() - w));
+    const Wide w_sq = w.squaredNorm();
+    return w_sq > Wide(0) ? Scalar(detail::sizeOf(missing) / w_sq) : Scalar(0);
   }
 };
 
@@ -58,36 +61,37 @@ template <Real Scalar, class Layout>
 ContactVirial<Scalar> contactVirial(const Bodies<Scalar, Layout>& bodies,
                                     std::span<const Contact<Scalar>> contacts,
                                     std::span<const ContactImpulse<Scalar>> impulses, const Scalar& h) {
-  using Sum = Eigen::Array<Scalar, 7, 1>;
+  using Wide = detail::AtLeastDouble<Scalar>;
+  const auto wide = [](const auto& v) { return Vector3<Wide>(Vector3<Scalar>(v).template cast<Wide>()); };
+  using Sum = Eigen::Array<Wide, 7, 1>;
   const Sum of = orderedSum(bodies.size(), 1024, Sum(Sum::Zero()), [&](std::size_t begin, std::size_t end) {
     Sum part = Sum::Zero();
     for (std::size_t i = begin; i < end; ++i) {
       const auto body = bodies[i];
       if (!body.isFixed()) {
-        const Scalar m = body.mass();
+        const auto m = Wide(body.mass());
         part[0] += m;
-        part.template segment<3>(1) += Vector3<Scalar>(m * Vector3<Scalar>(body.position())).array();
-        part.template segment<3>(4) += Vector3<Scalar>(m * Vector3<Scalar>(body.velocity())).array();
+        part.template segment<3>(1) += Vector3<Wide>(m * wide(body.position())).array();
+        part.template segment<3>(4) += Vector3<Wide>(m * wide(body.velocity())).array();
       }
     }
     return part;
   });
   ContactVirial<Scalar> virial;
-  if (!(of[0] > Scalar(0))) {
+  if (!(of[0] > Wide(0))) {
     return virial;
   }
-  const Vector3<Scalar> centre = of.template segment<3>(1).matrix() / of[0];
-  const Vector3<Scalar> drift = of.template segment<3>(4).matrix() / of[0];
-  using TwoSums = Eigen::Array<Scalar, 2, 1>;
+  const Vector3<Wide> centre = of.template segment<3>(1).matrix() / of[0];
+  const Vector3<Wide> drift = of.template segment<3>(4).matrix() / of[0];
+  using TwoSums = Eigen::Array<Wide, 2, 1>;
   const TwoSums terms =
       orderedSum(bodies.size(), 1024, TwoSums(TwoSums::Zero()), [&](std::size_t begin, std::size_t end) {
         TwoSums part = TwoSums::Zero();
         for (std::size_t i = begin; i < end; ++i) {
           const auto body = bodies[i];
           if (!body.isFixed()) {
-            part[0] += Scalar(body.mass()) * Vector3<Scalar>(body.velocity() - drift).squaredNorm();
-            part[1] +=
-                Vector3<Scalar>(body.force()).dot(Vector3<Scalar>(Vector3<Scalar>(body.position()) - centre));
+            part[0] += Wide(body.mass()) * Vector3<Wide>(wide(body.velocity()) - drift).squaredNorm();
+            part[1] += wide(body.force()).dot(Vector3<Wide>(wide(body.position()) - centre));
           }
         }
         return part;
@@ -99,13 +103,12 @@ ContactVirial<Scalar> contactVirial(const Bodies<Scalar, Layout>& bodies,
     const ContactImpulse<Scalar>& j = impulses[k];
     const bool boundary = c.second == staticPartner;
     if (!boundary && !bodies[c.first].isFixed() && !bodies[c.second].isFixed()) {
-      virial.contacts += j.normal * (c.arm1 + c.arm2) / h;
+      virial.contacts += Wide(j.normal) * Wide(c.arm1 + c.arm2) / Wide(h);
     } else {
-      const Vector3<Scalar> onSecond = (j.normal * c.normal + j.tangential) / h;
+      const Vector3<Wide> onSecond = (Wide(j.normal) * wide(c.normal) + wide(j.tangential)) / Wide(h);
       const bool holdsSecond = !boundary && bodies[c.first].isFixed();
-      const Vector3<Scalar> x = bodies[holdsSecond ? c.second : c.first].position();
-      virial.boundaries +=
-          (holdsSecond ? onSecond : Vector3<Scalar>(-onSecond)).dot(Vector3<Scalar>(x - centre));
+      const Vector3<Wide> x = wide(bodies[holdsSecond ? c.second : c.first].position());
+      virial.boundaries += (holdsSecond ? onSecond : Vector3<Wide>(-onSecond)).dot(Vector3<Wide>(x - centre));
     }
   }
   return virial;
