@@ -102,10 +102,14 @@ class SweepCourse {
   /// is left is the sum of a geometric series, q + q^2 + ... = q/(1 - q) of the last step, for which momentum
   /// takes sqrt(M/m) sweeps.
   S leapAfter(const SweepProgress<S>& now) const {
-    const bool oneWay = now.along * now.along > S(1 - 1e-6) * (now.size * before_);
+    if (!(now.along > S(0) && now.size > S(0) && before_ > S(0))) {
+      return S(0);
+    }
+    // By ratios: m^2 dv^4 of small grains is no float.
+    const bool oneWay = (now.along / now.size) * (now.along / before_) > S(1 - 1e-6);
     const S left = before_ - now.along;
     const bool isKnown = left > S(16) * roundoff<S>() * before_;
-    return oneWay && now.along > S(0) && isKnown ? S(now.along / left) : S(0);
+    return oneWay && isKnown ? S(now.along / left) : S(0);
   }
 
   S enough_;
