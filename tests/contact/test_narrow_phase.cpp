@@ -113,7 +113,7 @@ TEST_CASE("materials are mixed by id; an id without an entry is refused") {
   bodies[0].position()[0] += 10.0;
   CHECK_THROWS_WITH(
       narrow.find(allPairs(bodies), bodies, Domain<double>::open(), materials, floor, {}, contacts),
-      ContainsSubstring("material of a body is 2") && ContainsSubstring("number of materials, 2"));
+      ContainsSubstring("material of body 2 is 2") && ContainsSubstring("number of materials, 2"));
   CHECK(contacts.size() == 3);  // as it was
 }
 

@@ -102,6 +102,7 @@ class BoundaryContacts {
            mayRest(settings, {bodies.ids()[i], boundaryKey(wall.number)}, cursor) ||
            mayBegin<S>(settings, touch->gap, radius, approach(), falls()))) {
         const std::uint32_t m = bodies.materials()[i];
+        materials.require(m, i);
         const std::uint32_t number = part.surfaces.of(
             m, wall.number, wall.velocity, [&] { return materials.pair(m, wall.surface, wall.material); });
         part.contacts.push_back({static_cast<std::uint32_t>(i), staticPartner, bodies.ids()[i],

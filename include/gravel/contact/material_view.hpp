@@ -59,14 +59,27 @@ struct MaterialView {
     Material<Scalar> pair(std::uint32_t a, std::uint32_t b) const { return pair(a, b, (*this)[b]); }
     /// The same with a surface of number b, or `unlisted`, that is told what it is.
     Material<Scalar> pair(std::uint32_t a, std::uint32_t b, const Material<Scalar>& ofB) const {
+      const Material<Scalar>* own = measured(a, b);
+      return own != nullptr ? *own : mix((*this)[a], ofB);
+    }
+    /// Coefficients that these two have as a pair; null where they are mixed.
+    const Material<Scalar>* measured(std::uint32_t a, std::uint32_t b) const {
       const MaterialPair<Scalar> wanted{std::min(a, b), std::max(a, b), {}};
       const auto found = std::lower_bound(pairs.begin(), pairs.end(), wanted);
-      return found != pairs.end() && !(wanted < *found) ? found->material : mix((*this)[a], ofB);
+      return found != pairs.end() && !(wanted < *found) ? &found->material : nullptr;
+    }
+
+    /// \throws std::invalid_argument that names the body by its index, if there is none of its number
+    [[gnu::always_inline]] void require(std::uint32_t id, std::size_t body) const {
+      if (id >= entries.size()) {
+        refuse(id, "body " + std::to_string(body));
+      }
     }
 
    private:
-    [[noreturn, gnu::cold, gnu::noinline]] void refuse(std::uint32_t id) const {
-      detail::refuse("material of a body", std::to_string(id),
+    [[noreturn, gnu::cold, gnu::noinline]] void refuse(std::uint32_t id,
+                                                       const std::string& who = "a body") const {
+      detail::refuse("material of " + who, std::to_string(id),
                      "below the number of materials, " + std::to_string(entries.size()));
     }
 };

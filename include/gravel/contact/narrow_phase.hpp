@@ -240,8 +240,8 @@ class NarrowPhase {
     if (!overlaps && !detail::mayRest(settings, keysOf(pair, bodies), cursor) && !mayBegin()) {
       return false;
     }
-    (void)materials[bodies.materials()[i]];  // refused while the list is what it was
-    (void)materials[bodies.materials()[j]];
+    materials.require(bodies.materials()[i], i);  // refused while the list is what it was
+    materials.require(bodies.materials()[j], j);
     return true;
   }
 
