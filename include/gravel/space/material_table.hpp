@@ -63,13 +63,11 @@ class MaterialTable {
     return id == defaultMaterial ? ownOf(config) : entries_[static_cast<std::size_t>(id)];
   }
 
-  /// Of two in contact. O(materials). \throws std::invalid_argument, if there is none of them
+  /// Of two in contact. O(log pairs). \throws std::invalid_argument, if there is none of them
   Material<Scalar> pair(MaterialId a, MaterialId b, const Config& config) const {
     check(static_cast<std::uint32_t>(std::max(a, b)), "a pair");
-    std::vector<Material<Scalar>> all = entries_;
-    all[0] = ownOf(config);
-    return MaterialView<Scalar>(all, pairs_)
-        .pair(static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b));
+    const auto* own = view().measured(static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b));
+    return own != nullptr ? *own : mix(get(a, config), get(b, config));
   }
 
   /// All of them, the space's own by its present settings.
