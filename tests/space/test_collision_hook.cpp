@@ -87,7 +87,6 @@ TEST_CASE("Two that merge keep all that is kept, and the ledger has what they lo
       SimulationConfig<double> config = bouncy(1e-3);
       config.G = G;
       config.integrator = kind;
-      config.positionalCorrectionFactor = 0.0;  // to part two that slip past each other moves their orbit
       Space<double> space(config);
       const BodyId light = space.addBody(ball({-1.5, 0.3, 0}, {1, 0, 0.1}, 0.5, 1.0, {1, 2, 3}));
       const BodyId heavy = space.addBody(ball({0.5, 0, 0}, {-1, 0, 0}, 0.6, 2.0));
@@ -112,6 +111,25 @@ TEST_CASE("Two that merge keep all that is kept, and the ledger has what they lo
       CHECK(space.body(heavy).angularVelocity().norm() > 0.1);
       CHECK(space.addBody(ball({9, 9, 9}, {0, 0, 0}, 0.1)) == BodyId{3});
     }
+  }
+}
+
+// Four in a cloud that fall onto each other within a step, of which the first two are pressed together by
+// those that come later. Seen to fail: all pairs taken apart, by 1e-4 to 2e-2 of the energy.
+TEST_CASE("Those that merge in a step are not taken apart before it ends") {
+  for (const IntegratorKind kind : {IntegratorKind::VelocityVerlet, IntegratorKind::Yoshida4}) {
+    SimulationConfig<double> config = plain(0.02);
+    config.G = 1.0;
+    config.integrator = kind;
+    Space<double> space(config);
+    space.addBody(ball({-0.105, 0, 0}, {1, 0, 0}, 0.1, 0.25));
+    space.addBody(ball({0.105, 0.02, 0}, {-1, 0, 0}, 0.1, 0.25));
+    space.addBody(ball({-0.32, 0.01, 0}, {4, 0, 0}, 0.1, 0.25));
+    space.addBody(ball({0.32, 0.03, 0.01}, {-4, 0, 0}, 0.1, 0.25));
+    space.setCollisionHook(mergeAll);
+    space.computeDynamics(0);
+    CHECK(space.n() == 1);
+    CHECK(space.energyLedger().correction == 0.0);
   }
 }
 

@@ -151,6 +151,16 @@ void ContactStage<Scalar, Layout>::separate(Bodies& bodies, const Config& config
     return;
   }
   const Profiler::Scope scope(profiler, Phase::PositionalCorrection);
+  // Of two that will be one by the end of this part of the step nothing is to be taken apart.
+  for (const auto& [one, other] : impacts_.merges()) {
+    const ContactKeys keys{toInteger(one), toInteger(other)};
+    const auto found = std::lower_bound(
+        contacts_.begin(), contacts_.end(), keys,
+        [](const Contact<Scalar>& c, const ContactKeys& wanted) { return c.keys() < wanted; });
+    if (found != contacts_.end() && found->keys() == keys) {
+      found->gap = std::max<Scalar>(found->gap, Scalar(0));
+    }
+  }
   const CorrectionSettings<Scalar> settings{
       .factor = config.positionalCorrectionFactor,
       .maxIterations = sweepsOfLooks(contacts_.size()),
