@@ -3,8 +3,10 @@
 #include "laws/laws.hpp"
 #include "support/catch.hpp"
 
+#include <array>
 #include <cmath>
 #include <functional>
+#include <vector>
 
 using namespace gravel;
 using namespace gravel::test;
@@ -200,6 +202,89 @@ TEST_CASE("What slides and rolls in a direction that turns comes to rest where s
   CAPTURE((ends[0].x - ends[2].x).norm(), (ends[1].x - ends[2].x).norm());
   CHECK((ends[0].x - ends[2].x).norm() < 1e-4);
   CHECK((ends[1].x - ends[2].x).norm() < (ends[0].x - ends[2].x).norm());
+}
+
+// On the way up friction and weight act together, on the way down against each other: speeds change evenly,
+// so that a step is exact but for where it is at the turn, within one step.
+// Seen to fail: against what is left of the slip at the end of the half step, speeds are off by up to 1.1e-2.
+TEST_CASE("What slides or rolls up a slope and turns back has the speed of the closed form") {
+  const bool rolls = GENERATE(false, true);  // with rolling friction
+  constexpr double slope = 0.4, friction = 0.2, time = 1.5;
+  const double mass = rolls ? 1.4 : 1.0;  // what it resists with, in units of its mass
+  const double press = weight * std::cos(slope);
+  const double up = (weight * std::sin(slope) + friction * press) / mass;
+  const double down = (weight * std::sin(slope) - friction * press) / mass;
+  std::array<double, 2> off{};  // rms, of the place
+  for (std::size_t level = 0; level < 2; ++level) {
+    const double dt = level == 0 ? 0.02 : 0.005;
+    constexpr int starts = 24;
+    for (int k = 0; k < starts; ++k) {
+      const double v = 2.0 + 0.3 * k / starts;
+      const auto config = rough(dt, rolls ? 2.0 : friction, rolls ? friction : 0.0);
+      Space<double> space(config);
+      space.setUniformField({-weight * std::sin(slope), 0, -weight * std::cos(slope)});
+      space.addPlane({0, 0, 1}, 0.0);
+      Body<double> one = ball({0, 0, radius}, {v, 0, 0}, radius);
+      one.inertia = (rolls ? 0.4 : 1e12) * radius * radius;
+      if (rolls) {
+        one.angularVelocity = {0, v / radius, 0};
+      }
+      space.addBody(one);
+      advance(space, static_cast<std::size_t>(std::lround(time / dt)));
+      const double turn = v / up;
+      const double fallen = time - turn;
+      CAPTURE(rolls, dt, v);
+      CHECK(std::abs(space.body(0).velocity()[0] + down * fallen) < 1e-9);
+      const double x = space.body(0).position()[0] - 0.5 * (v * turn - down * fallen * fallen);
+      off[level] += x * x / starts;
+    }
+  }
+  CAPTURE(rolls, std::sqrt(off[0]), std::sqrt(off[1]));
+  CHECK(std::sqrt(off[0]) < 0.5 * up * 0.02 * 0.02);
+  CHECK(0.5 * std::log(off[0] / off[1]) / std::log(4.0) > 1.5);
+  CHECK(0.5 * std::log(off[0] / off[1]) / std::log(4.0) < 2.5);
+}
+
+// Half-swings are harmonic about where spring and friction balance.
+// Seen to fail: against what is left of the slip at the end of the half step.
+TEST_CASE("A body that swings on a spring with friction is of second order in the step") {
+  constexpr double friction = 0.02, stiffness = 30.0, time = 4.0;
+  const double omega = std::sqrt(stiffness);
+  const double off = friction * weight / stiffness;
+  std::vector<double> errors;
+  for (const double dt : {0.02, 0.01, 0.005, 0.0025}) {
+    double sum = 0;
+    for (int k = 0; k < 16; ++k) {
+      const double start = 1.0 + 0.05 * k / 16;
+      Space<double> space(rough(dt, friction, 0.0));
+      space.setUniformField({0, 0, -weight});
+      space.addPlane({0, 0, 1}, 0.0);
+      space.setForceHook([&](auto& bodies, double) {
+        bodies.forces()[0] += Vec(-stiffness * bodies.positions()[0][0], 0, 0);
+      });
+      Body<double> block = ball({start, 0, radius}, {0, 0, 0}, radius);
+      block.inertia = 1e12;
+      space.addBody(block);
+      advance(space, static_cast<std::size_t>(std::lround(time / dt)));
+      const double half = pi<double>() / omega;
+      const auto swings = std::floor(time / half);
+      const double side = std::fmod(swings, 2.0) == 0.0 ? 1.0 : -1.0;
+      const double amplitude = start - (2.0 * swings + 1.0) * off;
+      const double phase = omega * (time - swings * half);
+      const double x = side * (off + amplitude * std::cos(phase));
+      const double v = -side * omega * amplitude * std::sin(phase);
+      sum += std::pow(space.body(0).position()[0] - x, 2) +
+             std::pow((space.body(0).velocity()[0] - v) / omega, 2);
+    }
+    errors.push_back(std::sqrt(sum / 16));
+  }
+  CAPTURE(errors);
+  // Velocity Verlet turns faster by omega^3 h^2/24.
+  CHECK(errors[0] < 1.1 * std::pow(omega, 3) * 0.02 * 0.02 / 24 * time);
+  for (std::size_t level = 1; level < errors.size(); ++level) {
+    CHECK(std::log2(errors[level - 1] / errors[level]) > 1.9);
+    CHECK(std::log2(errors[level - 1] / errors[level]) < 2.1);
+  }
 }
 
 }  // namespace test_slides

@@ -48,7 +48,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
   std::vector<detail::TurningRow<S>> turning;  ///< by row; empty if nothing resists rolling or spinning
   detail::RowsBefore<S> earlier;               ///< of rows that last; of all others zero
   bool drifting = false;                       ///< any contact whose second side drifts
-  bool looksBack = false;                      ///< any row may last
+  bool looksBack = false;                      ///< any row may have one
   bool grips = false;                          ///< any contact with more friction at rest than in a slide
   bool atOnce = false;       ///< rows slide as soon as friction is cut: there is no time to ask
   bool active = false;       ///< any contact that approaches faster than it may, or is held by friction
@@ -189,6 +189,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
     const S& dt;
     const ContactSettings<S>& settings;
     bool fresh;
+    bool lasts;  ///< any row of a large island may
     const WayAhead<S>& way;
   };
 

@@ -125,18 +125,29 @@ void ContactProblem<S>::lookBack(const Taking<B>& taking, const Group& group, co
     marks[k].lasts = true;
     return sum.of(k);
   };
+  // In small islands all count that are more than a thousandth of a fall: what slides may stop and turn back.
+  const bool all = !taking.colouring.isOfLarge(group.row[0]);
+  const auto counts = [&](const typename Pack::Truth& lasting, std::size_t lane) {
+    return (lasting[lane] || (all && load[lane] > S(0))) && !marks[group.row[lane]].impact;
+  };
+  const auto isLong = [&](const Vector3<S>& v, std::size_t lane) {
+    return v.squaredNorm() > S(1e-6) * falls[lane] * falls[lane];
+  };
   const auto slip = slipOf(group, slipVelocity(row, b2.v - b1.v, v_n, b1, b2)) + aimed;
   const auto slides = lasts(slip, row.stick * push * tangentialMobility(row, m1, m2));
-  for (std::size_t lane = 0; slides.any() && lane < group.count; ++lane) {
+  for (std::size_t lane = 0; (all || slides.any()) && lane < group.count; ++lane) {
     const std::uint32_t k = group.row[lane];
-    if (slides[lane] && !marks[k].impact) {
+    if (counts(slides, lane)) {
       const auto a = [&](std::uint32_t slot) {
         return accelerationOf(taking.source, taking.colouring, slot);
       };
       const Vector3<S> n = row.n.at(lane);
       const Vector3<S> kick =
           speedIn(Vector3<S>(taking.way.kick * (a(group.slot2[lane]) - a(group.slot1[lane]))));
-      takeDown(k).slip = slip.at(lane) + aimed.at(lane) - (kick - n.dot(kick) * n);
+      const Vector3<S> before = slip.at(lane) + aimed.at(lane) - (kick - n.dot(kick) * n);
+      if (isLong(before, lane)) {
+        takeDown(k).slip = before;
+      }
     }
   }
   if (turning.empty()) {
@@ -147,10 +158,9 @@ void ContactProblem<S>::lookBack(const Taking<B>& taking, const Group& group, co
   const auto turn = rho - row.n.dot(rho) * row.n;
   const Pack mobility = lanes.q1 * lanes.q1 * m1.spin + lanes.q2 * lanes.q2 * m2.spin;
   const auto rolls = lasts(turn, lanes.rolling * push * mobility);
-  for (std::size_t lane = 0; rolls.any() && lane < group.count; ++lane) {
-    const std::uint32_t k = group.row[lane];
-    if (rolls[lane] && !marks[k].impact) {
-      takeDown(k).turn = turn.at(lane);
+  for (std::size_t lane = 0; (all || rolls.any()) && lane < group.count; ++lane) {
+    if (counts(rolls, lane) && isLong(turn.at(lane), lane)) {
+      takeDown(group.row[lane]).turn = turn.at(lane);
     }
   }
 }

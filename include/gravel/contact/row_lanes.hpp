@@ -203,8 +203,7 @@ struct RowSlides {
   typename Packed<S>::Truth kinetic;  ///< what cuts friction is the kinetic limit; in others the static one
   typename Packed<S>::Truth tired;    ///< that have begun to too often: they go on, since sweeps must end
   Packed<S> mostLoad = Packed<S>::all(highest<S>());  ///< friction is by no more than this
-  /// Of fast ones, else zero: slip and turn across n before the kick. What slides is held against the mean of
-  /// these and what is left, since it may turn in between: contact_problem_way.hpp.
+  /// Slip and turn across n before the kick, where they matter: contact_problem_way.hpp.
   PackedVector<S> slipBefore = PackedVector<S>::zero();
   PackedVector<S> turnBefore = PackedVector<S>::zero();
 };
@@ -225,6 +224,39 @@ template <Real S>
   return wanted - (mass * choose(along > P::zero(), cosine_sq, P::zero())) * before;
 }
 
+/// The part of `wanted`, which would stop a slide, that friction gives. What is longer than `most` becomes as
+/// long as `kept` and points against the slide: docs/theory-contact.md, "Which way friction points".
+/// \param mass,before  of againstBoth(); zero where it does not matter what was before
+/// \param slides  gets where it is not stopped
+template <Real S>
+[[gnu::always_inline]] inline PackedVector<S> holdSlide(const PackedVector<S>& wanted, const Packed<S>& most,
+                                                        const Packed<S>& kept, const Packed<S>& mass,
+                                                        const PackedVector<S>& before,
+                                                        typename Packed<S>::Truth& slides) {
+  using P = Packed<S>;
+  const P least = P::all(std::numeric_limits<S>::min());  // roots of lanes may take subnormal numbers for 0
+  const auto sizeOfLong = [&](const PackedVector<S>& v) {
+    return squareRoot(choose(slides, largerOf(v.squaredNorm(), least), P::all(S(1))));
+  };
+  const auto looksBack = before.sumAbs() > P::zero();
+  if (!looksBack.any()) {
+    slides = wanted.squaredNorm() > most * most;
+    return slides.any() ? choose(slides, (kept / sizeOfLong(wanted)) * wanted, wanted) : wanted;
+  }
+  // At this share of the kick it stops, if at all. Until then friction is against it.
+  const P size = squareRoot(largerOf(before.squaredNorm(), least));
+  const PackedVector<S> e = reciprocalOf(size) * before;
+  const P against = wanted.dot(e) + kept;
+  const auto stops = looksBack & (against > P::zero());
+  const P share = choose(stops, mass * size * reciprocalOf(mass * size + against), P::zero());
+  const PackedVector<S> first = -(share * kept) * e;
+  const PackedVector<S> rest = wanted - first;
+  const P left = P::all(S(1)) - share;
+  slides = rest.squaredNorm() > left * left * most * most;
+  const PackedVector<S> way = choose(stops, rest, againstBoth(wanted, mass, before));
+  return choose(slides, first + (left * kept / sizeOfLong(way)) * way, wanted);
+}
+
 /// The tangential impulse of `row` becomes right for its normal one: a row sticks up to the static limit.
 /// \param slip that is to vanish
 template <Real S>
@@ -235,20 +267,14 @@ template <Real S>
   const P zero = P::zero();
   const P mobility = tangentialMobility(row, b1, b2);
   const PackedVector<S> wanted = row.jt - reciprocalOf(mobility) * slip;
-  const P size_sq = wanted.squaredNorm();
   const P load = smallerOf(row.jn, sliding.mostLoad);
   const P most = choose(sliding.tired, row.slide, row.stick) * load;
   changes.rubs = (row.stick > zero) & (mobility > zero) & ((row.jn > zero) | (row.jt.sumAbs() > zero));
-  changes.slides = changes.rubs & (size_sq > most * most);
-  PackedVector<S> jt = choose(changes.rubs, wanted, row.jt);
-  if (changes.slides.any()) {
-    const P limit = choose(sliding.kinetic, row.slide, row.stick);
-    const PackedVector<S> against = againstBoth(wanted, reciprocalOf(mobility), sliding.slipBefore);
-    // Roots of lanes may take subnormal numbers for 0.
-    const P normal_sq = largerOf(against.squaredNorm(), P::all(std::numeric_limits<S>::min()));
-    const P kept = limit * load / squareRoot(choose(changes.slides, normal_sq, P::all(S(1))));
-    jt = choose(changes.slides, kept * against, jt);
-  }
+  const P kept = choose(sliding.kinetic, row.slide, row.stick) * load;
+  const PackedVector<S> held =
+      holdSlide(wanted, most, kept, reciprocalOf(mobility), sliding.slipBefore, changes.slides);
+  changes.slides = changes.rubs & changes.slides;
+  const PackedVector<S> jt = choose(changes.rubs, held, row.jt);
   changes.dt = jt - row.jt;
   changes.du = mobility * changes.dt;
   row.jt = jt;

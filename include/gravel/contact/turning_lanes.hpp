@@ -64,17 +64,11 @@ struct TurningLanes {
     return q2 * b2.s - q1 * b1.s;
   }
 
-  /// What is longer than `most` made as long as `kept`. \param mass,before  of againstBoth()
+  /// holdSlide(), of which this is all that is asked.
   [[gnu::always_inline]] static inline V cut(const V& wanted, const P& most, const P& kept, const P& mass,
                                              const V& before) {
-    const auto longer = wanted.squaredNorm() > most * most;
-    if (!longer.any()) {
-      return wanted;
-    }
-    const V way = againstBoth(wanted, mass, before);
-    // Roots of lanes may take subnormal numbers for 0.
-    const P size = squareRoot(largerOf(way.squaredNorm(), P::all(std::numeric_limits<S>::min())));
-    return choose(longer, (kept / size) * way, wanted);
+    typename P::Truth slides;
+    return holdSlide(wanted, most, kept, mass, before, slides);
   }
 
   /// `wanted` within what the load of `row` allows; see resistTurning().
