@@ -96,6 +96,9 @@ class SleepStage {
     return lost;
   }
 
+  /// When forces are known: marks islands that are pulled otherwise than when they came to rest.
+  void lookForPull(const Bodies& bodies, const Config& config);
+
   /// Marks islands that something awake touches.
   void lookForTouch(const Bodies& bodies, const Contacts& contact) {
     number(bodies);
@@ -141,11 +144,7 @@ class SleepStage {
       for (const auto& impact : contact.impacts(bodies)) {
         rouseByTouch(impact);
       }
-      for (SleepingIsland<Scalar>& island : islands_) {
-        if (detail::isPulledOtherwise(bodies, island, Scalar(config.sleepSpeed / config.sleepTime))) {
-          island.state = IslandState::Waking;
-        }
-      }
+      lookForPull(bodies, config);
     }
     bool ready = false;
     for (std::size_t i = 0; i < bodies.size(); ++i) {

@@ -7,6 +7,15 @@
 
 namespace gravel {
 
+template <Real Scalar, class Layout>
+void SleepStage<Scalar, Layout>::lookForPull(const Bodies& bodies, const Config& config) {
+  for (SleepingIsland<Scalar>& island : islands_) {
+    if (detail::isPulledOtherwise(bodies, island, Scalar(config.sleepSpeed / config.sleepTime))) {
+      island.state = IslandState::Waking;
+    }
+  }
+}
+
 /// Marks islands into which a fixed body was put, moved or grown since the last look. O(bodies), and
 /// O(sleepers) for each fixed body that is another one than before.
 template <Real Scalar, class Layout>

@@ -145,6 +145,8 @@ void Space<Scalar, Layout>::prepare(const Scalar& h) {
   for (wakeTheChanged(); !forcesValid_ || placesChanged(); wakeTheChanged()) {
     forcesValid_ = false;  // if a hook throws
     applyGravity();
+    sleep_.lookForPull(bodies_, this->config_);
+    sleep_.wake(bodies_, contact_);
     stepGoesOn_ = false;
     updateAdaptiveTimeStep();  // contacts are taken to rest by what falls in a step
     buildCollisionGraph();
