@@ -179,6 +179,8 @@ class ContactStage {
   /// Nothing that contacts can move is awake: there is no search.
   void setIdle(bool idle) { idle_ = idle; }
   bool isIdle() const { return idle_; }
+  /// Whom the last separate() moved, and how far, by the indices of now; none once bodies came or went.
+  std::span<const Displacement<Scalar>> movedApart(const Bodies& bodies) const;
   /// Calls visit(i) for every held body i that a movable one comes near to within h [s].
   template <class Visit>
   void forEachApproach(const Bodies& bodies, const Config& config, const Scalar& time, const Scalar& h,
@@ -203,7 +205,6 @@ class ContactStage {
   /// Calls visit(contact, impulse) for what bore something in the first half of the part.
   template <class Visit>
   void forEachBefore(Visit&& visit) const;
-
   void bookKick(const Bodies& bodies, const Scalar& kick);
 
   void colour(const Bodies& bodies, Profiler& profiler) {
@@ -268,7 +269,6 @@ class ContactStage {
               const Scalar& h, Profiler& profiler);
 
   void prepareSurfaces(const Config& config, const PartOfStep<Scalar>& part = {});
-
   /// For the next h [s]. Nothing where all are to be looked at.
   std::optional<std::span<const std::uint32_t>> nearBoundaries(const Bodies& bodies, const Scalar& h);
 

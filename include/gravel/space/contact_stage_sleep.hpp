@@ -7,6 +7,14 @@
 
 namespace gravel {
 
+template <Real Scalar, class Layout>
+std::span<const Displacement<Scalar>> ContactStage<Scalar, Layout>::movedApart(const Bodies& bodies) const {
+  if (!moved_ || revision_ != bodies.revision()) {
+    return {};
+  }
+  return solver_.displacements();
+}
+
 /// On the straight way to the place at h, and as far beside it as the path bends. What leans on something
 /// does not fall, and what is slow comes near only when it touches: neighbours at rest would else wake each
 /// other for ever.

@@ -4,9 +4,9 @@
 /// Bodies that rest for long fall asleep, and wake when anything happens to them.
 ///
 /// An island, movable bodies joined by contacts, falls asleep when each of its bodies has been slower than
-/// `sleepSpeed`, its surface by spin as well, for `sleepTime`, nothing that it leans on moves, and what it
-/// leans on carries it: the impulses on it balance its forces. So nothing falls asleep in flight. What is
-/// asleep stands still, keeps the impulses of its contacts, and pulls others as before. It wakes
+/// `sleepSpeed`, also at its surface by spin and where it is moved out of others, for `sleepTime`, nothing
+/// that it leans on moves, and what it leans on carries it: the impulses on it balance its forces. So nothing
+/// falls asleep in flight. What sleeps stands still, keeps its impulses and pulls as before. It wakes
 ///   when something awake touches it, or comes as near within the next step,
 ///   when what it leans on is moved, removed, or moves,
 ///   when a fixed body is put into one of its bodies,
@@ -151,6 +151,10 @@ class SleepStage {
       const bool slow = detail::isMovable(bodies, i) && isSlow(bodies[i], config);
       slow_[i] = slow ? Scalar(slow_[i] + h) : Scalar(0);
       ready = ready || slow_[i] >= config.sleepTime;
+    }
+    for (const Displacement<Scalar>& d : contact.movedApart(bodies)) {  // whatever its velocity is
+      const bool slow = d.shift.squaredNorm() < config.sleepSpeed * config.sleepSpeed * h * h;
+      slow_[d.body] = slow ? slow_[d.body] : Scalar(0);
     }
     if (ready) {
       findTired(bodies, contact, config, h);
