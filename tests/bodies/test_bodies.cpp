@@ -242,38 +242,41 @@ TEMPLATE_LIST_TEST_CASE("bodies: validateAll finds what was written past the doo
   }
   c.bodies.remove(BodyId{0});  // so that index and id differ
   CHECK_NOTHROW(c.bodies.validateAll());
-  const auto found = [&](const char* field, auto change) {
+  using Proxy = decltype(c.bodies[0]);
+  struct Change {
+    const char* field;
+    S value;
+    void (*write)(Proxy, const S&);
+  };
+  const auto orientation = [](Proxy b, const S& x) { b.orientation().coeffs().setConstant(x); };
+  const auto mass = [](Proxy b, const S& x) { b.mass() = x; };
+  const auto radius = [](Proxy b, const S& x) { b.radius() = x; };
+  // The factor is what was written, not the inertia that it makes.
+  const auto factor = [](Proxy b, const S& x) { b.inertiaFactor() = x; };
+  for (const Change& change :
+       {Change{"position", nan, [](Proxy b, const S&x) { b.position().z() = x; }},
+        Change{"velocity", std::numeric_limits<S>::infinity(),
+               [](Proxy b, const S&x) { b.velocity().x() = x; }},
+        Change{"angularVelocity", nan, [](Proxy b, const S&x) { b.angularVelocity().y() = x; }},
+        Change{"orientation", nan, [](Proxy b, const S&x) { b.orientation().w() = x; }},
+        Change{"orientation", S(0), orientation}, Change{"mass", S(-1), mass}, Change{"mass", nan, mass},
+        Change{"mass", S(0), mass}, Change{"radius", S(-1), radius}, Change{"radius", nan, radius},
+        Change{"radius", std::numeric_limits<S>::max() / S(4), radius},
+        Change{"radius", std::numeric_limits<S>::min(), radius}, Change{"inertiaFactor", nan, factor},
+        Change{"inertiaFactor", S(-1), factor}, Change{"inertiaFactor", S(0), factor}}) {
     for (std::uint64_t id = 1; id < 7; ++id) {  // each place in a tile of four, and behind it
       const auto body = c.bodies[c.bodies.indexOf(BodyId{id})];
       const Body<S> good = body.load();
-      change(body);
+      change.write(body, change.value);
       const std::string message =
           messageOf<std::invalid_argument>([&] { std::as_const(c.bodies).validateAll(); });
       INFO(message);
-      CHECK(message.find("gravel: " + std::string(field) + " of body " + std::to_string(id) + " is ") == 0);
+      CHECK(message.find("gravel: " + std::string(change.field) + " of body " + std::to_string(id) +
+                         " is ") == 0);
       body.store(good);
       CHECK_NOTHROW(c.bodies.validateAll());
     }
-  };
-  found("position", [&](auto b) { b.position().z() = nan; });
-  found("velocity", [&](auto b) { b.velocity().x() = std::numeric_limits<S>::infinity(); });
-  found("angularVelocity", [&](auto b) { b.angularVelocity().y() = nan; });
-  found("orientation", [&](auto b) { b.orientation().w() = nan; });
-  found("orientation", [&](auto b) { b.orientation().coeffs().setZero(); });
-  found("mass", [&](auto b) { b.mass() = S(-1); });
-  found("mass", [&](auto b) { b.mass() = nan; });
-  found("mass", [&](auto b) { b.mass() = S(0); });
-  found("radius", [&](auto b) { b.radius() = S(-1); });
-  found("radius", [&](auto b) { b.radius() = nan; });
-  const auto factor = [&](const S& k) {
-    return [&c, k](auto b) { c.bodies.inertiaFactors()[b.index()] = k; };
-  };
-  found("radius", [&](auto b) { b.radius() = std::numeric_limits<S>::max() / S(4); });
-  found("radius", [&](auto b) { b.radius() = std::numeric_limits<S>::min(); });
-  // The factor is what was written, not the inertia that it makes.
-  found("inertiaFactor", factor(nan));
-  found("inertiaFactor", factor(S(-1)));
-  found("inertiaFactor", factor(S(0)));
+  }
 
   Body<S> tracer = sampleBody<S>();
   tracer.mass = S(0);
