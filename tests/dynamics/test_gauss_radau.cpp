@@ -385,9 +385,10 @@ TEMPLATE_TEST_CASE("A star amid evenly spread planets does not stop the clock", 
   }
 }
 
-// Seen to hang ("no end"): the difference between 1 and the next number taken as 0.
-TEMPLATE_TEST_CASE("A scalar that knows no limits does not stop the clock", "", float, double) {
-  using S = MinimalRealOf<TestType>;
+// Of float's range. Seen to hang ("no end"): the difference between 1 and the next number taken as 0, and as
+// that of a double.
+TEST_CASE("A scalar that knows no limits does not stop the clock") {
+  using S = MinimalRealOf<float>;
   std::vector<Body<S>> list(4);
   for (int k = 0; k < 3; ++k) {  // amid them the star has no acceleration but rounding
     const double angle = 2 * pi<double>() * k / 3;

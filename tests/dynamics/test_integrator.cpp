@@ -374,6 +374,7 @@ TEST_CASE("A spinning body keeps a unit orientation through a million steps") {
   CHECK((exact.coeffs() - q.coeffs()).norm() < 1e-10);
 }
 
+// Each layout in double, and one of them in each other scalar: no code depends on both.
 TEMPLATE_TEST_CASE("All layouts give the same bits in every method", "",
                    GRAVEL_TEST_TYPES(double, float, long double)) {
   using S = TestType;
@@ -385,7 +386,14 @@ TEMPLATE_TEST_CASE("All layouts give the same bits in every method", "",
   };
   for (const IntegratorKind kind : kinds) {
     const Body<S> soa = endOf(SoA{}, kind);
-    for (const Body<S>& other : {endOf(AoS{}, kind), endOf(AoSoA<8>{}, kind)}) {
+    std::vector<Body<S>> others;
+    if constexpr (!std::is_same_v<S, float>) {
+      others.push_back(endOf(AoS{}, kind));
+    }
+    if constexpr (!std::is_same_v<S, long double>) {
+      others.push_back(endOf(AoSoA<8>{}, kind));
+    }
+    for (const Body<S>& other : others) {
       CHECK(soa.position == other.position);
       CHECK(soa.velocity == other.velocity);
       CHECK(soa.orientation.coeffs() == other.orientation.coeffs());
