@@ -3,7 +3,7 @@
 /// Spaces of other scalars and layouts that several tests need. Each is made once, in space_of_*.cpp: a
 /// minute of compiling, which every test that made its own would take again. Sanitizers go without them:
 /// there bodies of all layouts run in bodies/, and the whole space of a user's storage in
-/// laws/test_own_storage.cpp.
+/// laws/test_own_particles.cpp.
 
 #include "support/catch.hpp"
 #include <gravel/space/space.hpp>
