@@ -134,11 +134,11 @@ TEST_CASE("Accelerations beyond a scalar's range ask for nothing, rather than fo
     body.radius = 0.5F;
     body.mass = 1e30F;
     bodies.add(body);
-    bodies[static_cast<std::size_t>(k)].acceleration() = Vector3<float>(k == 0 ? 1e10F : -1e10F, 0, 0);
+    bodies[static_cast<std::size_t>(k)].acceleration() = Vector3<float>(k == 0 ? 1e25F : -1e25F, 0, 0);
   }
   contacts[0].first = 0;
   contacts[0].second = 1;
-  CHECK(PileStep<float>{}.longest(bodies, contacts) > 0.0F);
+  CHECK(PileStep<float>{}.longest(bodies, contacts) == std::numeric_limits<float>::infinity());
 }
 
 // Seen to ask for nothing: suns, whose sum of masses times diameters was beyond a float's range; dust of
