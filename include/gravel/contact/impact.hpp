@@ -24,12 +24,13 @@ struct ImpactSettings {
   Scalar epsilon = Scalar(0);               ///< [m] centres closer than this count as one point
   /// What strikes a body after so many impacts of it in the step stays in contact with it, so that no cascade
   /// goes on for ever. An impact counts 1 - e + 1/512, since only those that lose energy can go on for ever;
-  /// further bounces from the same partner, of which the number is bounded otherwise, 1/512.
+  /// further bounces from the same partner, of which the number is bounded otherwise, 1/512. The heavier one
+  /// of two is charged a part of that by the ratio of their masses, and what cannot move nothing.
   static constexpr int mostPerBody = 8;
   /// After so many of these, too, the body flies on until the end of the step, through what is in its way,
   /// and is left to the solver of simultaneous contacts: a heavy one that presses a light one against a wall
   /// would else go on for as many blows as the ratio of their masses.
-  static constexpr std::uint32_t mostAfter = 64;
+  static constexpr int mostAfter = 64;
   /// After so many blows of both in a step two bodies that lean on each other are no longer driven together
   /// by others, unless faster than what they fall by in the step.
   static constexpr std::uint32_t mostSlow = 8;
@@ -181,8 +182,8 @@ struct ImpactHistory {
   std::uint32_t rests = std::numeric_limits<std::uint32_t>::max();
   std::uint64_t partner = 0;  ///< of the last impact
   S spent = S(0);
-  std::uint32_t after = 0;  ///< impacts since `mostPerBody` was spent
-  bool free = false;        ///< let go: nothing holds it any more
+  S after = S(0);     ///< charged since `mostPerBody` was spent
+  bool free = false;  ///< let go: nothing holds it any more
 };
 
 }  // namespace detail

@@ -135,26 +135,50 @@ class ImpactPast {
   /// It is left to the solver of simultaneous contacts.
   template <class Scene>
   bool isLeftToSolver(const Scene& scene, std::uint32_t body) const {
-    return histories_.of(body).after >= scene.settings.mostAfter;
+    return histories_.of(body).after >= S(scene.settings.mostAfter);
+  }
+
+  /// The part of an impact that `body` is charged: of what a blow between equals does to it, all of it to the
+  /// lighter one. A large body may be struck by any number of grains in a step, which change its course by
+  /// little: charged as they are it bounced no more after sixteen, and the rest flew through it. Of two
+  /// movable bodies one at least is not the heavier one, whatever the rounding of their masses, and pays in
+  /// full; so does what meets a boundary or what cannot move. So there are no more impacts in a step than
+  /// bodies times those that use up the share of one, 8 * 512 + 64.
+  template <class B>
+  static S chargeOf(const B& bodies, std::uint32_t body, std::uint32_t other) {
+    if (!isMovable(bodies, body)) {
+      return S(0);
+    }
+    if (other == staticPartner || !isMovable(bodies, other)) {
+      return S(1);
+    }
+    const S own = bodies.masses()[body];
+    const S its = bodies.masses()[other];
+    if (!(its < own)) {
+      return S(1);
+    }
+    const S ratio = its / own;  // the sum of two masses may be out of range
+    return S(2) * ratio / (S(1) + ratio);
   }
 
   /// Enters the last impact. \param ends  the two take no notice of each other any more in this step
   template <class Scene>
   void remember(const Scene& scene, const S& e, ImpactReport<S>& report, bool ends = false) {
     const Impact<S>& impact = impacts_.back();
-    const auto enter = [&](std::uint32_t body, std::uint64_t partner) {
+    const auto enter = [&](std::uint32_t body, std::uint32_t other, std::uint64_t partner) {
       ImpactHistory<S>& past = histories_.at(body);
       const bool before = bouncesNoMore(scene, body);
+      const S charge = chargeOf(scene.bodies, body, other);
       const S least = S(1) / S(512);
-      past.after += before ? 1 : 0;
-      past.spent += past.impacts > 0 && past.partner == partner ? least : S(S(1) - e + least);
+      past.after += before ? charge : S(0);
+      past.spent += charge * (past.impacts > 0 && past.partner == partner ? least : S(S(1) - e + least));
       past.partner = partner;
       ++past.impacts;
       report.postponed += bouncesNoMore(scene, body) && !before ? 1U : 0U;
     };
-    enter(impact.first, impact.key2);
+    enter(impact.first, impact.second, impact.key2);
     if (impact.second != staticPartner) {
-      enter(impact.second, impact.key1);
+      enter(impact.second, impact.first, impact.key1);
     }
     earlier_.push_back(none);
     // Once a pair: balls without restitution may press on each other a hundred times in a step.
