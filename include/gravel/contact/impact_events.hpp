@@ -28,7 +28,6 @@ namespace gravel {
 template <Real S>
 class ImpactEvents : private detail::ImpactCourses<S> {
   using Base = detail::ImpactCourses<S>;
-  using Base::after;
   using Base::bouncesNoMore;
   using Base::flightOf;
   using Base::flights_;
@@ -39,6 +38,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
   using Base::leans_;
   using Base::letGo;
   using Base::merges_;
+  using Base::pairsOf_;
   using Base::predictAgain;
   using Base::predictAll;
   using Base::queue_;
@@ -87,9 +87,11 @@ class ImpactEvents : private detail::ImpactCourses<S> {
     S now(0);
     const auto goOn = [&](std::initializer_list<std::uint32_t> struck) {
       for (const std::uint32_t i : struck) {
-        near.follow(bodies, i, now, late_);
-        swept_.renew(scene, i, settings.h);
-        flights_.renew(scene, i);
+        if (detail::isMovable(bodies, i)) {
+          late_.add(i, near.pairs(), pairsOf_, [&](auto& out) { near.follow(bodies, i, now, out); });
+          swept_.renew(scene, i, settings.h);
+          flights_.renew(scene, i);
+        }
       }
       for (const std::uint32_t i : struck) {
         predictAgain(scene, near.pairs(), i, now);
@@ -105,12 +107,8 @@ class ImpactEvents : private detail::ImpactCourses<S> {
         struck_.clear();
         continue;
       }
-      std::pop_heap(queue_.begin(), queue_.end(), after);
-      const Event event = queue_.back();
-      queue_.pop_back();
-      const bool second = event.second != staticPartner;
-      if (histories_.of(event.first).impacts != event.stamp1 ||
-          (second && histories_.of(event.second).impacts != event.stamp2)) {
+      const Event event = queue_.pop();
+      if (queue_.isVoid(event, histories_)) {
         continue;
       }
       now = event.t;
@@ -118,7 +116,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
         continue;
       }
       struck_.push_back(event.first);
-      if (second) {
+      if (event.second != staticPartner) {
         struck_.push_back(event.second);
         goOn({event.first, event.second});
       } else {
@@ -141,7 +139,7 @@ class ImpactEvents : private detail::ImpactCourses<S> {
   /// Pairs of ids that shall merge, in the order of the impacts of the last call.
   const BodyPairs& merges() const { return merges_; }
   /// Pairs that follow() added in the last call.
-  const std::vector<Pair>& candidatesAdded() const { return late_; }
+  const std::vector<Pair>& candidatesAdded() const { return late_.all(); }
   /// The blows of the last call, in the order in which they were dealt.
   const std::vector<Impact<S>>& impacts() const { return impacts_; }
   std::vector<Impact<S>>& impacts() { return impacts_; }

@@ -6,7 +6,9 @@
 #include <gravel/contact/contact.hpp>
 #include <gravel/contact/impact_flights.hpp>
 #include <gravel/contact/impact_past.hpp>
+#include <gravel/contact/impact_queue.hpp>
 #include <gravel/contact/impact_scene.hpp>
+#include <gravel/contact/late_pairs.hpp>
 #include <gravel/contact/pairs_of_bodies.hpp>
 #include <gravel/contact/resting_gap.hpp>
 #include <gravel/contact/swept_spheres.hpp>
@@ -18,7 +20,7 @@
 
 namespace gravel::detail {
 
-/// The events to come of a step in the order of (time, keys).
+/// Finds the events to come of a step.
 template <Real S>
 class ImpactForecast : protected ImpactPast<S> {
   using Base = ImpactPast<S>;
@@ -46,8 +48,6 @@ class ImpactForecast : protected ImpactPast<S> {
   using Base::leans_;
   using Event = ImpactEvent<S>;
   using Flight = ImpactFlight<S>;
-
-  static bool after(const Event& a, const Event& b) { return comesAfter(a, b); }
 
   static constexpr std::size_t chunk = 1024;
 
@@ -86,12 +86,8 @@ class ImpactForecast : protected ImpactPast<S> {
         }
       }
     });
-    clearSpare(queue_);
-    for (std::size_t c = 0; c < count; ++c) {
-      queue_.insert(queue_.end(), parts_[c].begin(), parts_[c].end());
-    }
+    queue_.fill(parts_);
     parts_.resize(std::min<std::size_t>(count, 2));
-    std::make_heap(queue_.begin(), queue_.end(), after);
   }
 
   /// Before blows: whose the pairs are that may meet.
@@ -106,6 +102,7 @@ class ImpactForecast : protected ImpactPast<S> {
   void end() {
     swept_.forget();
     flights_.end();
+    late_.end();
     Base::end();
   }
 
@@ -172,23 +169,19 @@ class ImpactForecast : protected ImpactPast<S> {
     }
   }
 
+  /// After a blow. What cannot move is on the same course as before, and meets others as was foreseen.
   template <class Scene>
   void predictAgain(const Scene& scene, std::span<const Pair> pairs, std::uint32_t body, const S& from) {
-    if (isLeftToSolver(scene, body)) {
+    if (isLeftToSolver(scene, body) || !isMovable(scene.bodies, body)) {
       return;
     }
     pairsOf_.any(body, pairs, [&](std::uint32_t k) {
       predict(scene, pairs[k], from, k);
       return false;
     });
-    for (const Pair& pair : late_) {
-      if (pair.first == body || pair.second == body) {
-        predict(scene, pair, from, Base::noPair);
-      }
-    }
+    late_.each(body, [&](const Pair& pair) { predict(scene, pair, from, Base::noPair); });
     const Flight one = flights_.of(scene, body);
-    const bool meets = one.radius > S(0) && detail::isMovable(scene.bodies, body);
-    for (std::uint32_t w = 0; meets && w < scene.walls.size(); ++w) {
+    for (std::uint32_t w = 0; one.radius > S(0) && w < scene.walls.size(); ++w) {
       const HalfSpace<S>& wall = scene.walls[w];
       if (!swept_.mayMeet(body, wall, w)) {
         continue;
@@ -199,7 +192,7 @@ class ImpactForecast : protected ImpactPast<S> {
       const bool flies = isApart(gap, one.radius) || !isHeld(scene, body, staticPartner, keys);
       if (const auto t = flies ? timeOfImpact<S>(flight, wall.normal, one.radius, from)
                                : driven(scene, body, staticPartner, flight, wall.normal, from)) {
-        schedule({*t, body, staticPartner, keys.first, keys.second, 0, 0, w});
+        queue_.push({*t, body, staticPartner, keys.first, keys.second, 0, 0, w}, histories_);
       }
     }
   }
@@ -227,15 +220,8 @@ class ImpactForecast : protected ImpactPast<S> {
     const bool flies = !held || isApart(S(detail::safeNorm(at) - reach), reach);
     if (const auto t = flies ? timeOfImpact<S>(flight, reach, from)
                              : driven(scene, i, j, flight, detail::safeUnit(at), from)) {
-      schedule({*t, i, j, keys.first, keys.second});
+      queue_.push({*t, i, j, keys.first, keys.second}, histories_);
     }
-  }
-
-  void schedule(Event event) {
-    event.stamp1 = histories_.of(event.first).impacts;
-    event.stamp2 = event.second == staticPartner ? 0 : histories_.of(event.second).impacts;
-    queue_.push_back(event);
-    std::push_heap(queue_.begin(), queue_.end(), after);
   }
 
   /// Whether blows have set a body free that leans on others: what bears it and what lies on it opens at
@@ -308,13 +294,13 @@ class ImpactForecast : protected ImpactPast<S> {
     return fast ? std::optional<S>(from) : std::nullopt;
   }
 
-  std::vector<Event> queue_;
+  ImpactQueue<S> queue_;
   SweptSpheres<S> swept_;
   ImpactFlights<S> flights_;
   std::vector<std::vector<Event>> parts_;
   std::uint64_t linked_ = 0;
   PairsOfBodies pairsOf_;
-  std::vector<Pair> late_;
+  LatePairs late_;
 };
 
 }  // namespace gravel::detail

@@ -173,7 +173,7 @@ class ImpactPast {
       past.after += before ? charge : S(0);
       past.spent += charge * (past.impacts > 0 && past.partner == partner ? least : S(S(1) - e + least));
       past.partner = partner;
-      ++past.impacts;
+      past.impacts += isMovable(scene.bodies, body) ? 1U : 0U;  // or what is foreseen of it holds on
       report.postponed += bouncesNoMore(scene, body) && !before ? 1U : 0U;
     };
     enter(impact.first, impact.second, impact.key2);
