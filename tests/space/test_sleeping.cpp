@@ -408,7 +408,7 @@ TEST_CASE("A fixed body that is moved, freed or removed wakes what leans on it")
 // However long it had been at rest before. Seen to fail: only velocities were looked at, which moving a body
 // out of another leaves as they are: it slept after 2 to 12 steps, with up to 0.2 of the overlap of 0.25.
 TEST_CASE("Nobody falls asleep while it is moved out of another") {
-  const int before = GENERATE(20, 28, 29, 30, 40);  // asleep after 31
+  const std::size_t before = GENERATE(20U, 28U, 29U, 30U, 40U);  // asleep after 31
   SimulationConfig<double> config = sleepy();
   config.positionalCorrectionFactor = 0.2;
   Space<double> space(config);
