@@ -189,7 +189,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
     const S& dt;
     const ContactSettings<S>& settings;
     bool fresh;
-    bool lasts;  ///< any row of a large island may
+    bool lasts;  ///< any row but lone ones may
     const WayAhead<S>& way;
   };
 
@@ -267,10 +267,11 @@ class ContactProblem : public detail::ProblemBodies<S> {
 
   /// Takes down how rows slipped and turned before, of those that last.
   /// \param b1,b2 as in aim() \param v_n without drifts \param aimed  slip that is left to the way ahead
+  /// \param alone  of contacts that share no movable body, where only accelerations change slips on the way
   template <class B>
   void lookBack(const Taking<B>& taking, const Group& group, const Lanes& row, const detail::BodyLanes<S>& b1,
                 const detail::BodyLanes<S>& b2, const Pack& v_n, const Pack& load,
-                const detail::PackedVector<S>& aimed, Taken& sum);
+                const detail::PackedVector<S>& aimed, bool alone, Taken& sum);
 
   /// Target of a row that may be faster than what rests.
   template <class B>

@@ -42,7 +42,7 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   // A slip is at most of four speeds and spins of three components.
   const S fall = speedIn(S(this->leastFall_ * dt));
   const bool lasts = drifting || S(7) * this->fastest_ > detail::RowBefore<S>::lasting() * fall;
-  looksBack = friction && way.kick > S(0) && (lasts || colouring.islandsEnd() > 0);
+  looksBack = friction && way.kick > S(0) && (lasts || colouring.loneCount() > 0);
   detail::resizeSparingly(approaches_, contacts.size());
   detail::resizeSparingly(wrongs_, again ? colouring.islandsEnd() : 0);
   passes = again && watch.holds() && sameScales_ && ratio == S(1) && !kinds.spring && !drifting &&
@@ -221,8 +221,9 @@ inline S ContactProblem<S>::aim(const Taking<B>& taking, const Group& group, Lan
   for (std::size_t lane = 0; lane < group.count && slips; ++lane) {  // of the others they are zero
     aimSlip(taking, group, lane, row, drift[lane], slip.at(lane));
   }
-  if (looksBack && (taking.lasts || !taking.colouring.isOfLarge(group.row[0]))) {
-    lookBack(taking, group, row, b1, b2, present, load, slip, sum);
+  const bool alone = group.row[0] < taking.colouring.loneCount() && !bends && taking.way.frame == S(0);
+  if (looksBack && (taking.lasts || alone)) {
+    lookBack(taking, group, row, b1, b2, present, load, slip, alone, sum);
   }
   const Pack approach = row.target - present;
   S most(0);

@@ -75,7 +75,7 @@ class PileStep {
     /// West 1979, Communications of the ACM 22, 532.
     void add(const Scalar& m, const Scalar& r, const Vector3<Scalar>& its) {
       mass += m;
-      const Scalar share = m / mass;
+      const Scalar share = mass > Scalar(0) ? Scalar(m / mass) : Scalar(0);
       const Vector3<Scalar> off = its - a;
       a += share * off;
       d += share * (Scalar(2) * r - d);

@@ -135,31 +135,10 @@ class SleepStage {
     }
   }
 
-  /// After a step of length h: marks what was touched or pulled otherwise, counts how long each body has been
-  /// slow, and notes what is tired.
-  void watch(const Bodies& bodies, const Contacts& contact, const Config& config, const Scalar& h) {
-    follow(bodies);
-    if (!islands_.empty()) {
-      lookForTouch(bodies, contact);
-      for (const auto& impact : contact.impacts(bodies)) {
-        rouseByTouch(impact);
-      }
-      lookForPull(bodies, config);
-    }
-    bool ready = false;
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      const bool slow = detail::isMovable(bodies, i) && isSlow(bodies[i], config);
-      slow_[i] = slow ? Scalar(slow_[i] + h) : Scalar(0);
-      ready = ready || slow_[i] >= config.sleepTime;
-    }
-    for (const Displacement<Scalar>& d : contact.movedApart(bodies)) {  // whatever its velocity is
-      const bool slow = d.shift.squaredNorm() < config.sleepSpeed * config.sleepSpeed * h * h;
-      slow_[d.body] = slow ? slow_[d.body] : Scalar(0);
-    }
-    if (ready) {
-      findTired(bodies, contact, config, h);
-    }
-  }
+  /// After a step of length h, the last part of it `part`: marks what was touched or pulled otherwise and
+  /// what is tired, and counts how long each body has been slow.
+  void watch(const Bodies& bodies, const Contacts& contact, const Config& config, const Scalar& h,
+             const Scalar& part);
 
   /// What has become of these pairs of ids has been slow for no time.
   void startAnew(const Bodies& bodies, const BodyPairs& merges) {

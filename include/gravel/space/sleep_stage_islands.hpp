@@ -8,6 +8,32 @@
 namespace gravel {
 
 template <Real Scalar, class Layout>
+void SleepStage<Scalar, Layout>::watch(const Bodies& bodies, const Contacts& contact, const Config& config,
+                                       const Scalar& h, const Scalar& part) {
+  follow(bodies);
+  if (!islands_.empty()) {
+    lookForTouch(bodies, contact);
+    for (const auto& impact : contact.impacts(bodies)) {
+      rouseByTouch(impact);
+    }
+    lookForPull(bodies, config);
+  }
+  bool ready = false;
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const bool slow = detail::isMovable(bodies, i) && isSlow(bodies[i], config);
+    slow_[i] = slow ? Scalar(slow_[i] + h) : Scalar(0);
+    ready = ready || slow_[i] >= config.sleepTime;
+  }
+  for (const Displacement<Scalar>& d : contact.movedApart(bodies)) {  // whatever its velocity is
+    const bool slow = d.shift.squaredNorm() < config.sleepSpeed * config.sleepSpeed * part * part;
+    slow_[d.body] = slow ? slow_[d.body] : Scalar(0);
+  }
+  if (ready) {
+    findTired(bodies, contact, config, h);
+  }
+}
+
+template <Real Scalar, class Layout>
 void SleepStage<Scalar, Layout>::lookForPull(const Bodies& bodies, const Config& config) {
   for (SleepingIsland<Scalar>& island : islands_) {
     if (detail::isPulledOtherwise(bodies, island, Scalar(config.sleepSpeed / config.sleepTime))) {

@@ -105,7 +105,7 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration, const Sc
     left_.work -= contact_.report().driftWork;
     applyDamping();
     if (this->config_.sleepSpeed > Scalar(0)) {
-      sleep_.watch(bodies_, contact_, this->config_, h);
+      sleep_.watch(bodies_, contact_, this->config_, h, contact_dt_);
     }
   } else {
     parts_ = 1;
