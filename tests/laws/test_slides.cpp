@@ -3,10 +3,8 @@
 #include "laws/laws.hpp"
 #include "support/catch.hpp"
 
-#include <array>
 #include <cmath>
 #include <functional>
-#include <vector>
 
 using namespace gravel;
 using namespace gravel::test;
@@ -204,65 +202,8 @@ TEST_CASE("What slides and rolls in a direction that turns comes to rest where s
   CHECK((ends[1].x - ends[2].x).norm() < (ends[0].x - ends[2].x).norm());
 }
 
-struct UpAndDown {
-  const char* what;
-  double slope;
-  double kinetic;  ///< of friction, or of what resists rolling
-  double resting;  ///< friction at rest
-  bool rolls = false;
-  double spinning = 0.0;  ///< resistance
-};
-
-// On the way up friction and weight act together, on the way down against each other: speeds change evenly,
-// so that a step is exact but for where it is at the turn, within one step. Steps and speeds are of some 100
-// and 1: rounding of 1e-14 in each. Seen to fail: against what is left of the slip at the end of the half
-// step, speeds off by up to 1.1e-2; stopped by friction at rest before it was at rest, 3e-3; the slip before
-// not asked for where anything in the scene resists spinning, 1e-2; without the energy guard's exception,
-// 1e-2 at 1.5 rad.
-TEST_CASE("What slides or rolls up a slope and turns back has the speed of the closed form") {
-  const auto body =
-      GENERATE(UpAndDown{"slides", 0.4, 0.2, 0.2}, UpAndDown{"grips", 0.4, 0.2, 0.4},
-               UpAndDown{"slides where spins are resisted", 0.4, 0.2, 0.2, false, 0.01},
-               UpAndDown{"slides up a wall", 1.5, 1.0, 1.0}, UpAndDown{"rolls", 0.4, 0.2, 2.0, true});
-  constexpr double time = 1.5;
-  const double mass = body.rolls ? 1.4 : 1.0;  // what it resists with, in units of its mass
-  const double press = weight * std::cos(body.slope);
-  const double up = (weight * std::sin(body.slope) + body.kinetic * press) / mass;
-  const double down = (weight * std::sin(body.slope) - body.kinetic * press) / mass;
-  std::array<double, 2> off{};  // rms, of the place
-  for (std::size_t level = 0; level < 2; ++level) {
-    const double dt = level == 0 ? 0.02 : 0.005;
-    constexpr int starts = 24;
-    for (int k = 0; k < starts; ++k) {
-      const double v = 2.0 + 0.3 * k / starts;
-      SimulationConfig<double> config =
-          rough(dt, body.rolls ? body.resting : body.kinetic, body.rolls ? body.kinetic : 0.0);
-      config.coeffStaticFriction = body.resting;
-      config.spinningFriction = body.spinning;
-      Space<double> space(config);
-      space.setUniformField({-weight * std::sin(body.slope), 0, -weight * std::cos(body.slope)});
-      space.addPlane({0, 0, 1}, 0.0);
-      Body<double> one = ball({0, 0, radius}, {v, 0, 0}, radius);
-      one.inertia = (body.rolls ? 0.4 : 1e12) * radius * radius;
-      one.angularVelocity = {0, body.rolls ? v / radius : 0.0, 0};
-      space.addBody(one);
-      advance(space, static_cast<std::size_t>(std::lround(time / dt)));
-      const double turn = v / up;
-      const double fallen = time - turn;
-      CAPTURE(body.what, dt, v);
-      CHECK(std::abs(space.body(0).velocity()[0] + down * fallen) < 1e-11);
-      CHECK(std::abs(space.body(0).velocity()[2]) < 1e-12);
-      const double x = space.body(0).position()[0] - 0.5 * (v * turn - down * fallen * fallen);
-      off[level] += x * x / starts;
-    }
-  }
-  CAPTURE(body.what, std::sqrt(off[0]), std::sqrt(off[1]));
-  CHECK(std::sqrt(off[0]) < 0.5 * up * 0.02 * 0.02);
-  CHECK(0.5 * std::log(off[0] / off[1]) / std::log(4.0) > 1.5);
-  CHECK(0.5 * std::log(off[0] / off[1]) / std::log(4.0) < 2.5);
-}
-
-// Seen to fail (0.037 m/s): what the torque did in the kick passed for a slide, which used friction up.
+// Seen to fail (0.037 m/s), where slips before the kick were asked for of what is slow, too: what the torque
+// did in the kick passed for a slide, which used friction up.
 TEST_CASE("A torque that static friction can hold makes a ball roll") {
   constexpr double slope = 0.562, friction = 0.3, torque = 1.066;
   Space<double> space(rough(0.02, friction, 0.0));
@@ -275,48 +216,6 @@ TEST_CASE("A torque that static friction can hold makes a ball roll") {
   CHECK((end.v + end.w.cross(Vec(0, 0, -radius))).norm() < 1e-12);
   const Vec rolls = Vec(weight * std::sin(slope), torque / radius, 0) / 1.4;
   CHECK((end.v - rolls).norm() < 1e-11);
-}
-
-// Half-swings are harmonic about where spring and friction balance.
-// Seen to fail: against what is left of the slip at the end of the half step.
-TEST_CASE("A body that swings on a spring with friction is of second order in the step") {
-  constexpr double friction = 0.02, stiffness = 30.0, time = 4.0;
-  const double omega = std::sqrt(stiffness);
-  const double off = friction * weight / stiffness;
-  std::vector<double> errors;
-  for (const double dt : {0.02, 0.01, 0.005, 0.0025}) {
-    double sum = 0;
-    for (int k = 0; k < 16; ++k) {
-      const double start = 1.0 + 0.05 * k / 16;
-      Space<double> space(rough(dt, friction, 0.0));
-      space.setUniformField({0, 0, -weight});
-      space.addPlane({0, 0, 1}, 0.0);
-      space.setForceHook([&](auto& bodies, double) {
-        bodies.forces()[0] += Vec(-stiffness * bodies.positions()[0][0], 0, 0);
-      });
-      Body<double> block = ball({start, 0, radius}, {0, 0, 0}, radius);
-      block.inertia = 1e12;
-      space.addBody(block);
-      advance(space, static_cast<std::size_t>(std::lround(time / dt)));
-      const double half = pi<double>() / omega;
-      const auto swings = std::floor(time / half);
-      const double side = std::fmod(swings, 2.0) == 0.0 ? 1.0 : -1.0;
-      const double amplitude = start - (2.0 * swings + 1.0) * off;
-      const double phase = omega * (time - swings * half);
-      const double x = side * (off + amplitude * std::cos(phase));
-      const double v = -side * omega * amplitude * std::sin(phase);
-      sum += std::pow(space.body(0).position()[0] - x, 2) +
-             std::pow((space.body(0).velocity()[0] - v) / omega, 2);
-    }
-    errors.push_back(std::sqrt(sum / 16));
-  }
-  CAPTURE(errors);
-  // Velocity Verlet turns faster by omega^3 h^2/24.
-  CHECK(errors[0] < 1.1 * std::pow(omega, 3) * 0.02 * 0.02 / 24 * time);
-  for (std::size_t level = 1; level < errors.size(); ++level) {
-    CHECK(std::log2(errors[level - 1] / errors[level]) > 1.9);
-    CHECK(std::log2(errors[level - 1] / errors[level]) < 2.1);
-  }
 }
 
 }  // namespace test_slides

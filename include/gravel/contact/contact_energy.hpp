@@ -166,26 +166,12 @@ class ContactEnergy {
     }
     const detail::PackedVector<S> drift = driftOf(problem, colouring, contacts, group);
     const auto [normal, across] = power(problem, group, row, b1, b2, drift);
-    const Pack term =
-        normal + lossOnly(problem, colouring, group, across) + takenBack(problem, colouring, group, row);
+    const Pack term = normal + across + takenBack(problem, colouring, group, row);
     for (std::size_t lane = 0; lane < group.count; ++lane) {
       terms_[group.row[lane]] = term[lane];
     }
     const Pack work = problem.drifting ? row.wholeImpulse().dot(drift) : zero;
     return Sums(-normal.sum(), -across.sum(), -work.sum(), largerOf(term, zero).sum());
-  }
-
-  /// What friction brought to a stop inside the kick and let turn back slipped against it at first, while u^-
-  /// has the whole kick in it: no gain.
-  static Pack lossOnly(const ContactProblem<S>& problem, const ContactColoring& colouring, const Group& group,
-                       const Pack& across) {
-    if (group.row[0] >= colouring.loneCount()) {
-      return across;
-    }
-    const Pack zero = Pack::zero();
-    const Pack lasts =
-        Pack::of([&](std::size_t lane) { return S(problem.marks[group.row[lane]].lasts ? 1 : 0); });
-    return choose(lasts > zero, smallerOf(across, zero), across);
   }
 
   /// Of problems with masses or speeds far from 1.
@@ -217,8 +203,7 @@ class ContactEnergy {
         const auto [normal, across] = power(
             problem, group, row, BodyLanes::load(problem.initial, group.slot1),
             BodyLanes::load(problem.initial, group.slot2), driftOf(problem, colouring, contacts, group));
-        const Pack term =
-            normal + lossOnly(problem, colouring, group, across) + takenBack(problem, colouring, group, row);
+        const Pack term = normal + across + takenBack(problem, colouring, group, row);
         for (std::size_t lane = 0; lane < group.count; ++lane) {
           if (row.jn[lane] > S(0)) {
             islands_[islandOfRow_[group.row[lane]]].before += term[lane];

@@ -48,7 +48,7 @@ class ContactProblem : public detail::ProblemBodies<S> {
   std::vector<detail::TurningRow<S>> turning;  ///< by row; empty if nothing resists rolling or spinning
   detail::RowsBefore<S> earlier;               ///< of rows that last; of all others zero
   bool drifting = false;                       ///< any contact whose second side drifts
-  bool looksBack = false;                      ///< any row may have one
+  bool looksBack = false;                      ///< any row may last
   bool grips = false;                          ///< any contact with more friction at rest than in a slide
   bool atOnce = false;       ///< rows slide as soon as friction is cut: there is no time to ask
   bool active = false;       ///< any contact that approaches faster than it may, or is held by friction
@@ -189,7 +189,6 @@ class ContactProblem : public detail::ProblemBodies<S> {
     const S& dt;
     const ContactSettings<S>& settings;
     bool fresh;
-    bool lasts;  ///< any row but lone ones may
     const WayAhead<S>& way;
   };
 
@@ -267,11 +266,10 @@ class ContactProblem : public detail::ProblemBodies<S> {
 
   /// Takes down how rows slipped and turned before, of those that last.
   /// \param b1,b2 as in aim() \param v_n without drifts \param aimed  slip that is left to the way ahead
-  /// \param alone  of contacts that share no movable body, where only accelerations change slips on the way
   template <class B>
   void lookBack(const Taking<B>& taking, const Group& group, const Lanes& row, const detail::BodyLanes<S>& b1,
                 const detail::BodyLanes<S>& b2, const Pack& v_n, const Pack& load,
-                const detail::PackedVector<S>& aimed, bool alone, Taken& sum);
+                const detail::PackedVector<S>& aimed, Taken& sum);
 
   /// Target of a row that may be faster than what rests.
   template <class B>

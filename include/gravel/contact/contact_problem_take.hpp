@@ -42,14 +42,14 @@ void ContactProblem<S>::gather(const ContactView<S>& contacts, const B& source,
   // A slip is at most of four speeds and spins of three components.
   const S fall = speedIn(S(this->leastFall_ * dt));
   const bool lasts = drifting || S(7) * this->fastest_ > detail::RowBefore<S>::lasting() * fall;
-  looksBack = friction && way.kick > S(0) && (lasts || colouring.loneCount() > 0);
+  looksBack = friction && way.kick > S(0) && lasts;
   detail::resizeSparingly(approaches_, contacts.size());
   detail::resizeSparingly(wrongs_, again ? colouring.islandsEnd() : 0);
   passes = again && watch.holds() && sameScales_ && ratio == S(1) && !kinds.spring && !drifting &&
            way.bend.empty() && !this->isScaled() && settings.restitutionThreshold == threshold_ &&
            (turning.empty() || last.turns());
   threshold_ = settings.restitutionThreshold;
-  const Taking<B> taking{contacts, source, colouring, dt, settings, fresh, lasts, way};
+  const Taking<B> taking{contacts, source, colouring, dt, settings, fresh, way};
   Taken sum = detail::sumOverParts(
       0, colouring.loneCount(), Taken{}, [&](std::size_t begin, std::size_t end, Taken& part) {
         forGroups(colouring, begin, end, [&](const Group& group) { put(group, take(taking, group, part)); });
@@ -221,9 +221,8 @@ inline S ContactProblem<S>::aim(const Taking<B>& taking, const Group& group, Lan
   for (std::size_t lane = 0; lane < group.count && slips; ++lane) {  // of the others they are zero
     aimSlip(taking, group, lane, row, drift[lane], slip.at(lane));
   }
-  const bool alone = group.row[0] < taking.colouring.loneCount() && !bends && taking.way.frame == S(0);
-  if (looksBack && (taking.lasts || alone)) {
-    lookBack(taking, group, row, b1, b2, present, load, slip, alone, sum);
+  if (looksBack) {
+    lookBack(taking, group, row, b1, b2, present, load, slip, sum);
   }
   const Pack approach = row.target - present;
   S most(0);

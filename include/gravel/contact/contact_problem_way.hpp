@@ -13,8 +13,8 @@
 /// Friction of velocity Verlet in two halves, each of an impulse J(u) that depends on the slip u, is of
 /// second order if J is taken at the mean of the slips before and after its half (the implicit rule of the
 /// midpoint, which is its own inverse in time). After it alone is of first order where u turns, but finds the
-/// end of a slide. So what lasts is taken so, and what a step could stop is not, but for a contact alone, of
-/// which it is known when it stops. The slip before is that of the present velocities without the kick.
+/// end of a slide. So what lasts is taken so, and what a step could stop is not. The slip before is that of
+/// the present velocities without the kick.
 
 #include <gravel/contact/contact_problem.hpp>
 
@@ -107,7 +107,7 @@ template <class B>
 void ContactProblem<S>::lookBack(const Taking<B>& taking, const Group& group, const Lanes& row,
                                  const detail::BodyLanes<S>& b1, const detail::BodyLanes<S>& b2,
                                  const Pack& v_n, const Pack& load, const detail::PackedVector<S>& aimed,
-                                 bool alone, Taken& sum) {
+                                 Taken& sum) {
   const Pack zero = Pack::zero();
   const Pack falls = speedIn((b1.inverseMass + b2.inverseMass) * Pack::all(taking.dt));
   const auto m1 = detail::BodyLanes<S>::load(bodies, group.slot1);
@@ -125,38 +125,18 @@ void ContactProblem<S>::lookBack(const Taking<B>& taking, const Group& group, co
     marks[k].lasts = true;
     return sum.of(k);
   };
-  // Of a contact alone all count but for rounding: it may stop, and turn back. Not
-  // where torques turn its bodies: what they do in the kick is not known.
-  const auto isTurned = [&](std::uint32_t slot) {
-    if constexpr (requires { taking.source.torques()[0]; }) {
-      return taking.colouring.movable(slot) &&
-             detail::maxAbs(Vector3<S>(taking.source.torques()[taking.colouring.bodies()[slot]])) > S(0);
-    }
-    return false;
-  };
-  const auto counts = [&](const typename Pack::Truth& lasting, std::size_t lane) {
-    const bool may = lasting[lane] || (alone && load[lane] > S(0) && !isTurned(group.slot1[lane]) &&
-                                       !isTurned(group.slot2[lane]));
-    return may && !marks[group.row[lane]].impact;
-  };
-  const auto isLong = [&](const Vector3<S>& v, std::size_t lane) {
-    return v.squaredNorm() > S(1e-20) * falls[lane] * falls[lane];
-  };
   const auto slip = slipOf(group, slipVelocity(row, b2.v - b1.v, v_n, b1, b2)) + aimed;
   const auto slides = lasts(slip, row.stick * push * tangentialMobility(row, m1, m2));
-  for (std::size_t lane = 0; (alone || slides.any()) && lane < group.count; ++lane) {
+  for (std::size_t lane = 0; slides.any() && lane < group.count; ++lane) {
     const std::uint32_t k = group.row[lane];
-    if (counts(slides, lane)) {
+    if (slides[lane] && !marks[k].impact) {
       const auto a = [&](std::uint32_t slot) {
         return accelerationOf(taking.source, taking.colouring, slot);
       };
       const Vector3<S> n = row.n.at(lane);
       const Vector3<S> kick =
           speedIn(Vector3<S>(taking.way.kick * (a(group.slot2[lane]) - a(group.slot1[lane]))));
-      const Vector3<S> before = slip.at(lane) + aimed.at(lane) - (kick - n.dot(kick) * n);
-      if (isLong(before, lane)) {
-        takeDown(k).slip = before;
-      }
+      takeDown(k).slip = slip.at(lane) + aimed.at(lane) - (kick - n.dot(kick) * n);
     }
   }
   if (turning.empty()) {
@@ -167,9 +147,10 @@ void ContactProblem<S>::lookBack(const Taking<B>& taking, const Group& group, co
   const auto turn = rho - row.n.dot(rho) * row.n;
   const Pack mobility = lanes.q1 * lanes.q1 * m1.spin + lanes.q2 * lanes.q2 * m2.spin;
   const auto rolls = lasts(turn, lanes.rolling * push * mobility);
-  for (std::size_t lane = 0; (alone || rolls.any()) && lane < group.count; ++lane) {
-    if (counts(rolls, lane) && isLong(turn.at(lane), lane)) {
-      takeDown(group.row[lane]).turn = turn.at(lane);
+  for (std::size_t lane = 0; rolls.any() && lane < group.count; ++lane) {
+    const std::uint32_t k = group.row[lane];
+    if (rolls[lane] && !marks[k].impact) {
+      takeDown(k).turn = turn.at(lane);
     }
   }
 }

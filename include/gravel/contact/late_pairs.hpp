@@ -13,7 +13,7 @@
 namespace gravel::detail {
 
 /// Each once, however often the same body is sent elsewhere: else a block of n that bounces as a whole has
-/// n^2 of them after n blows, of which each is looked at after the next one. Four bytes a body and sixteen a
+/// n^2 of them after n blows, of which each is looked at after the next one. Eight bytes a body and sixteen a
 /// pair once there are any.
 class LatePairs {
  public:

@@ -14,7 +14,7 @@
 namespace gravel::detail {
 
 /// How a row slipped and turned across n before the kick, if that lasts: if it is more than so many times
-/// what a step does to it; of a contact alone also where the step may end it.
+/// what a step does to it.
 template <Real S>
 struct RowBefore {
   std::uint32_t row = 0;

@@ -106,7 +106,6 @@ struct RowImpulses {
     const typename Packed<S>::Truth no = Packed<S>::zero() > Packed<S>::zero();
     const bool tired = problem.marks[k].slides >= RowMark::patience;
     RowSlides<S> sliding{!no, tired ? !no : no};
-    sliding.alone = true;
     problem.lookBackAt(group, problem.earlier, sliding);
     const auto turned =
         problem.rub(group, row, b1, b2, slipVelocity(row, v_rel, row.n.dot(v_rel), b1, b2), sliding, changes);

@@ -203,10 +203,10 @@ struct RowSlides {
   typename Packed<S>::Truth kinetic;  ///< what cuts friction is the kinetic limit; in others the static one
   typename Packed<S>::Truth tired;    ///< that have begun to too often: they go on, since sweeps must end
   Packed<S> mostLoad = Packed<S>::all(highest<S>());  ///< friction is by no more than this
-  /// Slip and turn across n before the kick, where they matter: contact_problem_way.hpp.
+  /// Of fast ones, else zero: slip and turn across n before the kick. What slides is held against the mean of
+  /// these and what is left, since it may turn in between: contact_problem_way.hpp.
   PackedVector<S> slipBefore = PackedVector<S>::zero();
   PackedVector<S> turnBefore = PackedVector<S>::zero();
-  bool alone = false;  ///< they share no movable body
 };
 
 /// Against what friction holds a slide: along `wanted`, which is against the slip that is left, and against
@@ -225,42 +225,6 @@ template <Real S>
   return wanted - (mass * choose(along > P::zero(), cosine_sq, P::zero())) * before;
 }
 
-/// The part of `wanted`, which would stop a slide, that friction gives. What is longer than `most` becomes as
-/// long as `kept` and points against the slide: docs/theory-contact.md, "Which way friction points".
-/// \param mass,before  of againstBoth() \param slides  gets where it is not stopped
-template <Real S>
-[[gnu::always_inline]] inline PackedVector<S> holdSlide(const PackedVector<S>& wanted, const Packed<S>& most,
-                                                        const Packed<S>& kept, const Packed<S>& mass,
-                                                        const PackedVector<S>& before, bool alone,
-                                                        typename Packed<S>::Truth& slides) {
-  using P = Packed<S>;
-  const P least = P::all(std::numeric_limits<S>::min());  // roots of lanes may take subnormal numbers for 0
-  const auto held = [&](const PackedVector<S>& way, const P& size) {
-    const P size_sq = largerOf(way.squaredNorm(), least);
-    return (size / squareRoot(choose(slides, size_sq, P::all(S(1))))) * way;
-  };
-  const auto looksBack = before.sumAbs() > P::zero();
-  if (!(alone && looksBack.any())) {
-    slides = wanted.squaredNorm() > most * most;
-    return slides.any() ? choose(slides, held(againstBoth(wanted, mass, before), kept), wanted) : wanted;
-  }
-  // It stops at this share of the kick, if at all and if what drives it is along it. Until then friction is
-  // against it.
-  const P size = squareRoot(largerOf(before.squaredNorm(), least));
-  const PackedVector<S> e = reciprocalOf(size) * before;
-  const P along = wanted.dot(e);
-  const auto straight = looksBack & !(P::all(S(64)) * (wanted - along * e).squaredNorm() > kept * kept);
-  const P against = along + kept;
-  const auto stops = straight & (against > P::zero());
-  const P share = choose(stops, mass * size * reciprocalOf(mass * size + against), P::zero());
-  const PackedVector<S> first = -(share * kept) * e;
-  const PackedVector<S> rest = wanted - first;
-  const P left = P::all(S(1)) - share;
-  slides = (rest.squaredNorm() > left * left * most * most) | (straight & !stops);
-  const PackedVector<S> way = choose(stops, rest, againstBoth(wanted, mass, before));
-  return choose(slides, first + held(way, left * kept), wanted);
-}
-
 /// The tangential impulse of `row` becomes right for its normal one: a row sticks up to the static limit.
 /// \param slip that is to vanish
 template <Real S>
@@ -271,14 +235,20 @@ template <Real S>
   const P zero = P::zero();
   const P mobility = tangentialMobility(row, b1, b2);
   const PackedVector<S> wanted = row.jt - reciprocalOf(mobility) * slip;
+  const P size_sq = wanted.squaredNorm();
   const P load = smallerOf(row.jn, sliding.mostLoad);
   const P most = choose(sliding.tired, row.slide, row.stick) * load;
   changes.rubs = (row.stick > zero) & (mobility > zero) & ((row.jn > zero) | (row.jt.sumAbs() > zero));
-  const P kept = choose(sliding.kinetic, row.slide, row.stick) * load;
-  const PackedVector<S> held = holdSlide(wanted, most, kept, reciprocalOf(mobility), sliding.slipBefore,
-                                         sliding.alone, changes.slides);
-  changes.slides = changes.rubs & changes.slides;
-  const PackedVector<S> jt = choose(changes.rubs, held, row.jt);
+  changes.slides = changes.rubs & (size_sq > most * most);
+  PackedVector<S> jt = choose(changes.rubs, wanted, row.jt);
+  if (changes.slides.any()) {
+    const P limit = choose(sliding.kinetic, row.slide, row.stick);
+    const PackedVector<S> against = againstBoth(wanted, reciprocalOf(mobility), sliding.slipBefore);
+    // Roots of lanes may take subnormal numbers for 0.
+    const P normal_sq = largerOf(against.squaredNorm(), P::all(std::numeric_limits<S>::min()));
+    const P kept = limit * load / squareRoot(choose(changes.slides, normal_sq, P::all(S(1))));
+    jt = choose(changes.slides, kept * against, jt);
+  }
   changes.dt = jt - row.jt;
   changes.du = mobility * changes.dt;
   row.jt = jt;

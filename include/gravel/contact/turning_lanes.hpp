@@ -64,11 +64,17 @@ struct TurningLanes {
     return q2 * b2.s - q1 * b1.s;
   }
 
-  /// holdSlide(), of which this is all that is asked.
+  /// What is longer than `most` made as long as `kept`. \param mass,before  of againstBoth()
   [[gnu::always_inline]] static inline V cut(const V& wanted, const P& most, const P& kept, const P& mass,
-                                             const V& before, bool alone) {
-    typename P::Truth slides;
-    return holdSlide(wanted, most, kept, mass, before, alone, slides);
+                                             const V& before) {
+    const auto longer = wanted.squaredNorm() > most * most;
+    if (!longer.any()) {
+      return wanted;
+    }
+    const V way = againstBoth(wanted, mass, before);
+    // Roots of lanes may take subnormal numbers for 0.
+    const P size = squareRoot(largerOf(way.squaredNorm(), P::all(std::numeric_limits<S>::min())));
+    return choose(longer, (kept / size) * way, wanted);
   }
 
   /// `wanted` within what the load of `row` allows; see resistTurning().
@@ -82,7 +88,7 @@ struct TurningLanes {
       return kept * row.n;
     }
     const V across = wanted - along * row.n;
-    return cut(across, most, most, zero, V::zero(), false) + kept * row.n;
+    return cut(across, most, most, zero, V::zero()) + kept * row.n;
   }
 
   /// What a change dl of the impulse does: dl on the second bodies, its opposite on the first.
@@ -126,22 +132,21 @@ struct TurningLanes {
     const V& u0 = sliding.slipBefore;
     const V& rho0 = sliding.turnBefore;
     const V still = l + per_D * (m.both * row.n.cross(u) - m.slip * rho_t);
-    V dl = cut(still, mostTurn, mostTurn, mass * per_D * m.slip, rho0, sliding.alone) - l;
+    V dl = cut(still, mostTurn, mostTurn, mass * per_D * m.slip, rho0) - l;
     V dt = -reciprocalOf(m.slip) * (u + m.both * dl.cross(row.n));
-    const P limit = choose(sliding.kinetic, row.slide, row.stick) * rubbed;
-    holdSlide<S>(row.jt + dt, most, limit, mass * reciprocalOf(m.slip), u0, sliding.alone, changes.slides);
-    changes.slides = both & changes.slides;
+    changes.slides = both & ((row.jt + dt).squaredNorm() > most * most);
     auto right = both & !changes.slides;
     if (changes.slides.any()) {
       // Resistance is; or both are at their limits, and would come to the same again.
+      const P limit = choose(sliding.kinetic, row.slide, row.stick) * rubbed;
       const V stops = row.jt + per_D * (m.both * rho_t.cross(row.n) - m.turn * u);
-      const V dt_slides = cut(stops, most, limit, mass * per_D * m.turn, u0, sliding.alone) - row.jt;
+      const V dt_slides = cut(stops, most, limit, mass * per_D * m.turn, u0) - row.jt;
       const V dl_slides = -per_C * (rho_t + m.both * row.n.cross(dt_slides));
       const auto rolls = !((l + dl_slides).squaredNorm() > mostTurn * mostTurn);
       const V sticks = row.jt + dt;
-      const V dt_most = cut(sticks, limit, limit, mass * reciprocalOf(m.slip), u0, sliding.alone) - row.jt;
+      const V dt_most = cut(sticks, limit, limit, mass * reciprocalOf(m.slip), u0) - row.jt;
       const V beside = l - per_C * (rho_t + m.both * row.n.cross(dt_most));
-      const V dl_most = cut(beside, mostTurn, mostTurn, mass * per_C, rho0, sliding.alone) - l;
+      const V dl_most = cut(beside, mostTurn, mostTurn, mass * per_C, rho0) - l;
       const P little = P::all(S(8) * roundoff<S>()) * mostTurn;
       const auto same = !((dl_most - dl).squaredNorm() > little * little);
       right = (changes.slides & (rolls | same)) | right;
@@ -159,7 +164,7 @@ struct TurningLanes {
       changes.slides = slides | (rest & changes.slides);
       const V stops = l - per_C * (rho_t + m.both * row.n.cross(changes.dt));
       dt = choose(rest, changes.dt, dt);
-      const V kept = cut(stops, mostTurn, mostTurn, mass * per_C, rho0, sliding.alone);
+      const V kept = cut(stops, mostTurn, mostTurn, mass * per_C, rho0);
       dl = choose(rest, choose(m.turn > zero, kept, V::zero()) - l, dl);
     }
 
