@@ -4,6 +4,7 @@
 /// The gap that a contact at rest may have.
 
 #include <gravel/core/packed.hpp>
+#include <gravel/core/sizes.hpp>
 
 #include <algorithm>
 

@@ -51,18 +51,17 @@ Scalar roundoff() {
   }
 }
 
-/// The largest number, or of a user's scalar without numeric_limits the largest power of two that a double
-/// holds as well.
+/// The largest number, or of a user's scalar without numeric_limits a power of two times that of double that
+/// is near it.
 template <Real Scalar>
 Scalar highest() {
   if constexpr (std::numeric_limits<Scalar>::is_specialized) {
     return Scalar(std::numeric_limits<Scalar>::max());
   } else {
     static const double most = [] {
-      double x = 1;
-      while (2 * x < std::numeric_limits<double>::max() && Scalar(x) < Scalar(Scalar(2) * Scalar(x)) &&
-             Scalar(Scalar(2) * Scalar(x)) < Scalar(Scalar(4) * Scalar(x))) {  // an infinity is its double
-        x *= 2;
+      double x = std::numeric_limits<double>::max();
+      while (!(Scalar(Scalar(x) / Scalar(2)) < Scalar(x))) {  // an infinity is its half
+        x /= 2;
       }
       return x;
     }();

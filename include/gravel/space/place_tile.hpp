@@ -4,6 +4,7 @@
 /// Where bodies were at the last force evaluation, to notice what a user's hand changed since.
 
 #include <gravel/bodies/bodies.hpp>
+#include <gravel/core/sizes.hpp>
 
 namespace gravel::detail {
 
