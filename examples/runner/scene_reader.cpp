@@ -196,6 +196,16 @@ void readBodyRadius(TableReader& reader, std::array<double, 2>& radius, const Do
   requireRoom(reader, "bodyRadius", understood, radius[1], domain);
 }
 
+/// What a generator made about the origin, at rest as a whole.
+std::vector<Body<double>> moved(std::vector<Body<double>> bodies, const Vector3<double>& position,
+                                const Vector3<double>& velocity) {
+  for (Body<double>& body : bodies) {
+    body.position += position;
+    body.velocity += velocity;
+  }
+  return bodies;
+}
+
 void readCloud(TableReader& reader, const MaterialReader& materials, const Domain<double>& domain,
                std::vector<SceneBody>& bodies) {
   scenes::CloudOptions options;
@@ -213,14 +223,8 @@ void readCloud(TableReader& reader, const MaterialReader& materials, const Domai
   reader.real("bodySpin", options.bodySpin, notNegative());
   SceneBody look;
   readLook(reader, materials, look);
-  generate(reader, bodies, look, options.count, [&] {
-    auto made = scenes::rubbleCloud<double>(options);
-    for (Body<double>& body : made) {
-      body.position += position;
-      body.velocity += velocity;
-    }
-    return made;
-  });
+  generate(reader, bodies, look, options.count,
+           [&] { return moved(scenes::rubbleCloud<double>(options), position, velocity); });
 }
 
 void readColumn(TableReader& reader, const MaterialReader& materials, const Domain<double>& domain,
@@ -281,10 +285,8 @@ void readCluster(TableReader& reader, const MaterialReader& materials, double G,
   look.surface = Surface::Glowing;
   readLook(reader, materials, look);
   generate(reader, bodies, look, options.count, [&] {
-    auto made = scenes::plummerSphere<double>(options);
+    auto made = moved(scenes::plummerSphere<double>(options), position, velocity);
     for (Body<double>& body : made) {
-      body.position += position;
-      body.velocity += velocity;
       body.radius = radius;
     }
     return made;
