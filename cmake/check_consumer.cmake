@@ -1,6 +1,6 @@
 # cmake -DFROM=<way> -DGRAVEL_SOURCE=<folder> -DGRAVEL_BUILD=<folder> -DWORK=<folder> -DGENERATOR=<name>
 #       -DCOMPILER=<c++> -DMAKE_PROGRAM=<path> -DPKG_CONFIG=<path> -DEIGEN_DIR=<folder> -DNANOFLANN_DIR=<folder>
-#       -DSPACE=<object file> -DFLAGS=<options it was compiled with> -P check_consumer.cmake
+#       -DSPACE=<object files> -DFLAGS=<options it was compiled with> -P check_consumer.cmake
 #
 # Builds and runs tests/consumer against gravel taken in one way: find_package, pkg-config (both from an installation
 # that was moved after it was made), add_subdirectory or FetchContent. With find_package the program compiles all that
@@ -46,7 +46,7 @@ if(FROM STREQUAL "pkg-config")
   endforeach()
   execute_process(
     COMMAND "${COMPILER}" -std=c++20 ${options} -include "${GRAVEL_SOURCE}/tests/support/space.hpp"
-      "${consumer}/main.cpp" "${consumer}/other.cpp" "${SPACE}" ${flags} -o "${WORK}/consumer"
+      "${consumer}/main.cpp" "${consumer}/other.cpp" ${SPACE} ${flags} -o "${WORK}/consumer"
     COMMAND_ERROR_IS_FATAL ANY)
   execute_process(COMMAND "${WORK}/consumer" COMMAND_ERROR_IS_FATAL ANY)
   return()

@@ -1,5 +1,5 @@
 # cmake -DCOMPILER=<c++> -DINCLUDES=<folder|folder> -DOPTIONS=<options> -DPAGE=<file.md> -DWORK=<folder>
-#       "-DSPACE=<object file>" -P check_page.cmake
+#       "-DSPACE=<object files>" -P check_page.cmake
 #
 # Compiles the C++ of a Markdown page, so that what a reader copies works. A ```cpp block with `int main` is a
 # program: it is built and run, and must print what the next ```text block of the page shows, if one follows before
@@ -62,7 +62,7 @@ while(TRUE)
   set(objects "")
   if(code MATCHES "#include <gravel/gravel.hpp>")
     string(APPEND code "${spaces}")
-    set(objects "${SPACE}")
+    set(objects ${SPACE})
   endif()
   file(WRITE "${program}.cpp" "${code}")
   execute_process(COMMAND ${compile} "${program}.cpp" ${objects} -o "${program}" RESULT_VARIABLE result ERROR_VARIABLE output)
