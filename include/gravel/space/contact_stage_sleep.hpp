@@ -17,7 +17,9 @@ std::span<const Displacement<Scalar>> ContactStage<Scalar, Layout>::movedApart(c
 
 /// On the straight way to the place at h, and as far beside it as the path bends. What leans on something
 /// does not fall, and what is slow comes near only when it touches: neighbours at rest would else wake each
-/// other for ever.
+/// other for ever. What is met fast, or by a boundary, is thrown on at up to twice that speed for the rest of
+/// the step, what it meets then in its turn, and a boundary goes on behind them: whom they can reach so wakes
+/// as well. (Each passes on at most the way that it had left; a row of bodies ever lighter goes further.)
 template <Real Scalar, class Layout>
 template <class Visit>
 void ContactStage<Scalar, Layout>::forEachApproach(const Bodies& bodies, const Config& config,
@@ -33,41 +35,80 @@ void ContactStage<Scalar, Layout>::forEachApproach(const Bodies& bodies, const C
       leans[c.second] = 1;
     }
   }
+  const Scalar slow = config.sleepSpeed * h;             // [m]
+  std::vector<Scalar> thrown(bodies.size(), Scalar(0));  // [m] whichever way, within the step
+  for (const Plane<Scalar>& plane : boundaries.planes()) {
+    const Scalar way = h * Scalar(plane.normal.dot(plane.velocity) + detail::sizeOf<Scalar>(plane.swing()));
+    for (std::size_t i = 0; way > slow && i < bodies.size(); ++i) {
+      const Scalar gap =
+          plane.normal.dot(Vector3<Scalar>(bodies.positions()[i])) - plane.offset - bodies.radii()[i];
+      if (gap < way && bodies.radii()[i] > Scalar(0) && !bodies[i].isFixed()) {
+        thrown[i] = std::max<Scalar>(thrown[i], Scalar(2) * (way - std::max<Scalar>(gap, Scalar(0))));
+      }
+    }
+  }
   struct Ways {
     const Bodies& bodies;
     const std::vector<unsigned char>& leans;
+    const std::vector<Scalar>& thrown;
     Scalar h;
     Vector3<Scalar> operator()(std::size_t i) const {
       return detail::isMovable(bodies, i)
-                 ? Vector3<Scalar>(h * Vector3<Scalar>(bodies.velocities()[i]) + Scalar(4) * bend(i))
+                 ? Vector3<Scalar>(h * Vector3<Scalar>(bodies.velocities()[i]) + Scalar(4) * fall(i))
                  : Vector3<Scalar>(Vector3<Scalar>::Zero());
     }
-    Vector3<Scalar> bend(std::size_t i) const {
+    Vector3<Scalar> bend(std::size_t i) const { return fall(i) + thrown[i] * Vector3<Scalar>::UnitX(); }
+    Vector3<Scalar> otherBend(std::size_t i) const { return fall(i) - thrown[i] * Vector3<Scalar>::UnitX(); }
+    Scalar mostBend(std::size_t i) const { return detail::sumAbs(fall(i)) + thrown[i]; }
+    Vector3<Scalar> fall(std::size_t i) const {
       return detail::isMovable(bodies, i) && leans[i] == 0
                  ? Vector3<Scalar>(h * h / Scalar(8) * Vector3<Scalar>(bodies.accelerations()[i]))
                  : Vector3<Scalar>(Vector3<Scalar>::Zero());
     }
-  } way{bodies, leans, h};
-  search(bodies, config, time, way, h, profiler);
-  for (const Pair& pair : neighbours_.pairs()) {
-    const bool firstMoves = detail::isMovable(bodies, pair.first);
-    if (firstMoves == detail::isMovable(bodies, pair.second)) {
-      continue;
+  } way{bodies, leans, thrown, h};
+  const auto meets = [&](std::uint32_t one, std::uint32_t other) {
+    const bool held = !detail::isMovable(bodies, other);
+    const bool flies = thrown[one] > Scalar(0);
+    if (!flies && !detail::isMovable(bodies, one)) {
+      return false;
     }
-    const std::uint32_t one = firstMoves ? pair.first : pair.second;
-    const std::uint32_t held = firstMoves ? pair.second : pair.first;
     const Vector3<Scalar> w = way(one);
     const Vector3<Scalar> r = domain.minimumImage(
-        Vector3<Scalar>(Vector3<Scalar>(bodies.positions()[held]) - bodies.positions()[one]), time);
+        Vector3<Scalar>(Vector3<Scalar>(bodies.positions()[other]) - bodies.positions()[one]), time);
+    const bool strikes = r.dot(Vector3<Scalar>(w - way(other))) > slow * detail::safeNorm(r);
+    if (!flies && !strikes && !held) {
+      return false;
+    }
     const Scalar w_sq = w.squaredNorm();
     const Scalar share =
         w_sq > Scalar(0) ? std::clamp<Scalar>(r.dot(w) / w_sq, Scalar(0), Scalar(1)) : Scalar(0);
-    const bool fast = w_sq >= config.sleepSpeed * config.sleepSpeed * h * h;
-    const Scalar radii = Scalar(bodies.radii()[one]) + Scalar(bodies.radii()[held]);
-    const Scalar reach = detail::safeNorm(way.bend(one)) +
-                         (fast ? Scalar(radii * (Scalar(1) + detail::restingMargin<Scalar>())) : radii);
-    if (Vector3<Scalar>(r - share * w).squaredNorm() < reach * reach) {
-      visit(held);
+    const bool fast = w_sq >= slow * slow;
+    const Scalar radii = Scalar(bodies.radii()[one]) + Scalar(bodies.radii()[other]);
+    const Scalar near = radii * (Scalar(1) + detail::restingMargin<Scalar>());
+    const Scalar gap = std::max<Scalar>(detail::safeNorm(r) - radii, Scalar(0));
+    const Scalar reach = detail::safeNorm(way.fall(one)) + (fast ? near : radii);
+    const bool hit =
+        detail::isMovable(bodies, one) && Vector3<Scalar>(r - share * w).squaredNorm() < reach * reach;
+    Scalar on = thrown[one] - gap;
+    if (hit && strikes) {
+      on = std::max<Scalar>(on, Scalar(2) * (detail::safeNorm(w) - gap));
+    }
+    if (held && (hit || on > Scalar(0))) {
+      visit(other);
+    }
+    const bool further = on > thrown[other];
+    thrown[other] = std::max<Scalar>(thrown[other], on);
+    return further;
+  };
+  for (bool wider = true; wider;) {
+    wider = false;
+    search(bodies, config, time, way, h, profiler);
+    for (bool again = true; again; wider = wider || again) {
+      again = false;
+      for (const Pair& pair : neighbours_.pairs()) {
+        again = (!bodies[pair.second].isFixed() && meets(pair.first, pair.second)) || again;
+        again = (!bodies[pair.first].isFixed() && meets(pair.second, pair.first)) || again;
+      }
     }
   }
 }

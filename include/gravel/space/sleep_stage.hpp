@@ -7,7 +7,8 @@
 /// `sleepSpeed`, also at its surface by spin and where it is moved out of others, for `sleepTime`, nothing
 /// that it leans on moves, and what it leans on carries it: the impulses on it balance its forces. So nothing
 /// falls asleep in flight. What sleeps stands still, keeps its impulses and pulls as before. It wakes
-///   when something awake touches it, or comes as near within the next step,
+///   when something awake touches it, or comes as near within the next step, or strikes or drives what could
+///   do so then,
 ///   when what it leans on is moved, removed, or moves,
 ///   when a fixed body is put into one of its bodies,
 ///   when somebody changes one of its bodies, or the surfaces,
