@@ -11,7 +11,6 @@
 #include <gravel/spatial/pair.hpp>
 
 #include <array>
-#include <limits>
 #include <vector>
 
 namespace gravel {
@@ -178,12 +177,11 @@ bool comesAfter(const ImpactEvent<S>& a, const ImpactEvent<S>& b) {
 template <Real S>
 struct ImpactHistory {
   std::uint32_t impacts = 0;  ///< and other changes of its course
-  /// The last one that rests, of which this is the first body.
-  std::uint32_t rests = std::numeric_limits<std::uint32_t>::max();
   std::uint64_t partner = 0;  ///< of the last impact
   S spent = S(0);
   S after = S(0);     ///< charged since `mostPerBody` was spent
   bool free = false;  ///< let go: nothing holds it any more
+  bool ends = false;  ///< with a partner of a larger id, or a boundary, impacts of it came to an end
 };
 
 }  // namespace detail

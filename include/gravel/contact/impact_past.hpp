@@ -10,7 +10,7 @@
 
 #include <limits>
 #include <span>
-#include <utility>
+#include <unordered_map>
 #include <vector>
 
 namespace gravel::detail {
@@ -18,9 +18,10 @@ namespace gravel::detail {
 template <Real S>
 class ImpactPast {
  protected:
-  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
   static constexpr std::size_t noPair = std::numeric_limits<std::size_t>::max();
   enum class Listed : unsigned char { Unknown, No, Yes };
+  /// How the impacts of a pair came to an end in the step: it was brought to rest, or somebody else said so.
+  enum class Ending : unsigned char { None, Rest, Decided, Merge };
 
   /// A new step: nothing has happened.
   void forget() {
@@ -28,7 +29,7 @@ class ImpactPast {
     struck_.clear();
     islandsKnown_ = false;
     clearSpare(impacts_);
-    clearSpare(earlier_);
+    endings_.clear();
     merges_.clear();
     cleared_ = true;
   }
@@ -39,6 +40,7 @@ class ImpactPast {
     giveBack(anchored_);
     giveBack(struck_);
     islands_ = {};
+    endings_ = {};
   }
 
   /// For the impacts of so many bodies, of which so many pairs may meet.
@@ -92,27 +94,25 @@ class ImpactPast {
   }
 
   /// Whether somebody else has given the pair velocities in this step, with which they do not part.
-  bool isDecided(std::uint32_t first, std::uint64_t key2) const { return isDecided(first, key2, true); }
+  bool isDecided(std::uint32_t first, std::uint64_t key2) const {
+    return endingOf(first, key2) == Ending::Decided;
+  }
   /// Whether somebody else lets the two merge.
-  bool isToMerge(std::uint32_t first, std::uint64_t key2) const { return isDecided(first, key2, false); }
+  bool isToMerge(std::uint32_t first, std::uint64_t key2) const {
+    return endingOf(first, key2) == Ending::Merge;
+  }
 
-  bool isDecided(std::uint32_t first, std::uint64_t key2, bool rests) const {
-    for (std::uint32_t k = histories_.of(first).rests; k != none; k = earlier_[k]) {
-      if (impacts_[k].decided && impacts_[k].rests == rests && impacts_[k].key2 == key2) {
-        return true;
-      }
+  Ending endingOf(std::uint32_t first, std::uint64_t key2) const {
+    if (!histories_.of(first).ends) {
+      return Ending::None;
     }
-    return false;
+    const auto found = endings_.find({first, key2});
+    return found == endings_.end() ? Ending::None : found->second;
   }
 
   /// Brought to rest in this step, or decided so about.
   bool isAtRest(std::uint32_t first, std::uint64_t key2) const {
-    for (std::uint32_t k = histories_.of(first).rests; k != none; k = earlier_[k]) {
-      if (impacts_[k].key2 == key2) {
-        return true;
-      }
-    }
-    return false;
+    return endingOf(first, key2) != Ending::None;
   }
 
   /// Solved together with others, and neither was let go since; or brought to rest in this step.
@@ -180,13 +180,29 @@ class ImpactPast {
     if (impact.second != staticPartner) {
       enter(impact.second, impact.first, impact.key1);
     }
-    earlier_.push_back(none);
-    // Once a pair: balls without restitution may press on each other a hundred times in a step.
-    if (ends || (impact.rests && !isAtRest(impact.first, impact.key2))) {
-      earlier_.back() =
-          std::exchange(histories_.at(impact.first).rests, static_cast<std::uint32_t>(impacts_.size() - 1));
+    if (ends || impact.rests) {
+      histories_.at(impact.first).ends = true;
+      Ending& ending = endings_[{impact.first, impact.key2}];
+      if (impact.decided) {
+        ending = impact.rests ? Ending::Decided : Ending::Merge;
+      } else if (ending == Ending::None) {
+        ending = Ending::Rest;
+      }
     }
   }
+
+  /// The first body of a pair and the id of the second one.
+  struct PairName {
+    std::uint32_t first;
+    std::uint64_t key2;
+    bool operator==(const PairName&) const = default;
+  };
+  struct HashOfPair {
+    std::size_t operator()(const PairName& pair) const noexcept {
+      return static_cast<std::size_t>(
+          (pair.key2 ^ (std::uint64_t{pair.first} << 32U)) * 0x9E3779B97F4A7C15U >> 8U);
+    }
+  };
 
   bool cleared_ = false;  ///< since the last blow
   ImpactHistories<S> histories_;
@@ -197,7 +213,7 @@ class ImpactPast {
   bool islandsKnown_ = false;
   std::vector<std::uint32_t> struck_;  ///< by the blows of this moment
   std::vector<Impact<S>> impacts_;
-  std::vector<std::uint32_t> earlier_;  ///< of an impact that rests: the one before of the same first body
+  std::unordered_map<PairName, Ending, HashOfPair> endings_;  ///< of pairs that had one
   BodyPairs merges_;
 };
 
