@@ -17,10 +17,61 @@ class ImpactCourses : protected ImpactForecast<S> {
   using Base::foresees;
 
  protected:
+  using Base::flightOf;
+  using Base::flights_;
   using Base::histories_;
   using Base::isAnchored;
-  using Base::isSetFree;
+  using Base::isListed;
+  using Base::leans_;
+  using Base::pairsOf_;
+  using typename Base::Flight;
   using Side = ImpactSide<S>;
+
+  /// Whether blows have set a body free that leans on others: what bears it and what lies on it opens at
+  /// `from`, faster than it falls by in a step; what touches its sides does not count.
+  template <class Scene>
+  bool isSetFree(const Scene& scene, std::span<const Pair> pairs, std::uint32_t body, const S& from) {
+    const Vector3<S> support = scene.supportOf(body);
+    if (leans_[body] == 0 || support == Vector3<S>::Zero()) {
+      return false;
+    }
+    const S size = detail::safeNorm(support);
+    bool borne = false;
+    // A contact that pushes the body along n, and opens at speed u.
+    const auto holds = [&](const Vector3<S>& n, const S& u) {
+      const S share = n.dot(support);
+      borne = borne || share > size / S(1000);
+      return sizeOf<S>(share) > size / S(1000) && !(u > size * scene.settings.h);
+    };
+    const auto pairHolds = [&](std::uint32_t k) {
+      const auto& [i, j] = pairs[k];
+      if (!isListed(scene.held, {scene.bodies.ids()[i], scene.bodies.ids()[j]}, k)) {
+        return false;
+      }
+      const Flight one = flights_.of(scene, i);
+      const Flight two = flights_.of(scene, j);
+      Vector3<S> drift;
+      const RelativeFlight<S> flight = flightOf(scene, one, two, from, drift);
+      const Vector3<S> r = flight.place(from);
+      const S reach = one.radius + two.radius;
+      if (!(detail::safeNorm(r) <= reach * (S(1) + detail::restingMargin<S>()))) {
+        return false;  // moved apart by overlaps with others: it bears nothing, and is not in every list
+      }
+      const Vector3<S> n = detail::safeUnit(r);
+      return holds(body == i ? Vector3<S>(-n) : n, n.dot(flight.velocity(from)));
+    };
+    if (pairsOf_.any(body, pairs, pairHolds)) {
+      return false;
+    }
+    for (const HalfSpace<S>& wall : scene.walls) {
+      if (isListed(scene.held, {scene.bodies.ids()[body], boundaryKey(wall.number)}) &&
+          holds(wall.normal,
+                wall.normal.dot(flightOf(scene, flights_.of(scene, body), wall).velocity(from)))) {
+        return false;
+      }
+    }
+    return borne;
+  }
 
   /// A body that the blows of a moment t have lifted off what held it, with an acceleration s, falls freely
   /// from then on. The course x + u t - (a + s) t (h - t)/2, at u + (a + s)(t - h/2), goes on from the same

@@ -40,12 +40,11 @@ class ImpactForecast : protected ImpactPast<S> {
   }
 
  protected:
+  using Base::changed_;
   using Base::histories_;
   using Base::isDecided;
   using Base::isHeld;
   using Base::isLeftToSolver;
-  using Base::isListed;
-  using Base::leans_;
   using Event = ImpactEvent<S>;
   using Flight = ImpactFlight<S>;
 
@@ -169,6 +168,30 @@ class ImpactForecast : protected ImpactPast<S> {
     }
   }
 
+  /// A body is on another course from now on. What it meets there is to be looked for.
+  template <class Scene>
+  void change(const Scene& scene, std::uint32_t i) {
+    if (isMovable(scene.bodies, i)) {
+      swept_.renew(scene, i, scene.settings.h);
+      flights_.renew(scene, i);
+    }
+    Base::noteChange(i);
+  }
+
+  /// All bodies on other courses are looked at with what they may meet.
+  template <class Scene, class Near>
+  void predictChanged(const Scene& scene, Near& near, const S& from) {
+    for (const std::uint32_t i : changed_) {
+      if (isMovable(scene.bodies, i)) {
+        late_.add(i, near.pairs(), pairsOf_, [&](auto& out) { near.follow(scene.bodies, i, from, out); });
+      }
+    }
+    for (const std::uint32_t i : changed_) {
+      predictAgain(scene, near.pairs(), i, from);
+    }
+    Base::forgetChanges();
+  }
+
   /// After a blow. What cannot move is on the same course as before, and meets others as was foreseen.
   template <class Scene>
   void predictAgain(const Scene& scene, std::span<const Pair> pairs, std::uint32_t body, const S& from) {
@@ -180,20 +203,38 @@ class ImpactForecast : protected ImpactPast<S> {
       return false;
     });
     late_.each(body, [&](const Pair& pair) { predict(scene, pair, from, Base::noPair); });
+    for (std::uint32_t w = 0; w < scene.walls.size(); ++w) {
+      predict(scene, body, w, from);
+    }
+  }
+
+  /// What an event that is void now has become.
+  template <class Scene>
+  void predictAgain(const Scene& scene, const Event& event, const S& from) {
+    if (event.second == staticPartner) {
+      predict(scene, event.first, event.wall, from);
+    } else {
+      predict(scene, {event.first, event.second}, from, Base::noPair);
+    }
+  }
+
+  template <class Scene>
+  void predict(const Scene& scene, std::uint32_t body, std::uint32_t w, const S& from) {
+    const HalfSpace<S>& wall = scene.walls[w];
+    if (isLeftToSolver(scene, body) || !swept_.mayMeet(body, wall, w)) {
+      return;
+    }
     const Flight one = flights_.of(scene, body);
-    for (std::uint32_t w = 0; one.radius > S(0) && w < scene.walls.size(); ++w) {
-      const HalfSpace<S>& wall = scene.walls[w];
-      if (!swept_.mayMeet(body, wall, w)) {
-        continue;
-      }
-      const RelativeFlight<S> flight = flightOf(scene, one, wall);
-      const ContactKeys keys{scene.bodies.ids()[body], boundaryKey(wall.number)};
-      const S gap = wall.normal.dot(flight.place(from)) - one.radius;
-      const bool flies = isApart(gap, one.radius) || !isHeld(scene, body, staticPartner, keys);
-      if (const auto t = flies ? timeOfImpact<S>(flight, wall.normal, one.radius, from)
-                               : driven(scene, body, staticPartner, flight, wall.normal, from)) {
-        queue_.push({*t, body, staticPartner, keys.first, keys.second, 0, 0, w}, histories_);
-      }
+    if (!(one.radius > S(0))) {
+      return;
+    }
+    const RelativeFlight<S> flight = flightOf(scene, one, wall);
+    const ContactKeys keys{scene.bodies.ids()[body], boundaryKey(wall.number)};
+    const S gap = wall.normal.dot(flight.place(from)) - one.radius;
+    const bool flies = isApart(gap, one.radius) || !isHeld(scene, body, staticPartner, keys);
+    if (const auto t = flies ? timeOfImpact<S>(flight, wall.normal, one.radius, from)
+                             : driven(scene, body, staticPartner, flight, wall.normal, from)) {
+      queue_.push({*t, body, staticPartner, keys.first, keys.second, 0, 0, w}, histories_);
     }
   }
 
@@ -222,52 +263,6 @@ class ImpactForecast : protected ImpactPast<S> {
                              : driven(scene, i, j, flight, detail::safeUnit(at), from)) {
       queue_.push({*t, i, j, keys.first, keys.second}, histories_);
     }
-  }
-
-  /// Whether blows have set a body free that leans on others: what bears it and what lies on it opens at
-  /// `from`, faster than it falls by in a step; what touches its sides does not count.
-  template <class Scene>
-  bool isSetFree(const Scene& scene, std::span<const Pair> pairs, std::uint32_t body, const S& from) {
-    const Vector3<S> support = scene.supportOf(body);
-    if (leans_[body] == 0 || support == Vector3<S>::Zero()) {
-      return false;
-    }
-    const S size = detail::safeNorm(support);
-    bool borne = false;
-    // A contact that pushes the body along n, and opens at speed u.
-    const auto holds = [&](const Vector3<S>& n, const S& u) {
-      const S share = n.dot(support);
-      borne = borne || share > size / S(1000);
-      return sizeOf<S>(share) > size / S(1000) && !(u > size * scene.settings.h);
-    };
-    const auto pairHolds = [&](std::uint32_t k) {
-      const auto& [i, j] = pairs[k];
-      if (!isListed(scene.held, {scene.bodies.ids()[i], scene.bodies.ids()[j]}, k)) {
-        return false;
-      }
-      const Flight one = flights_.of(scene, i);
-      const Flight two = flights_.of(scene, j);
-      Vector3<S> drift;
-      const RelativeFlight<S> flight = flightOf(scene, one, two, from, drift);
-      const Vector3<S> r = flight.place(from);
-      const S reach = one.radius + two.radius;
-      if (!(detail::safeNorm(r) <= reach * (S(1) + detail::restingMargin<S>()))) {
-        return false;  // moved apart by overlaps with others: it bears nothing, and is not in every list
-      }
-      const Vector3<S> n = detail::safeUnit(r);
-      return holds(body == i ? Vector3<S>(-n) : n, n.dot(flight.velocity(from)));
-    };
-    if (pairsOf_.any(body, pairs, pairHolds)) {
-      return false;
-    }
-    for (const HalfSpace<S>& wall : scene.walls) {
-      if (isListed(scene.held, {scene.bodies.ids()[body], boundaryKey(wall.number)}) &&
-          holds(wall.normal,
-                wall.normal.dot(flightOf(scene, flights_.of(scene, body), wall).velocity(from)))) {
-        return false;
-      }
-    }
-    return borne;
   }
 
   /// A held pair that has flown apart since: if it meets again, then at its own time.
