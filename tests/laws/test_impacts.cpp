@@ -750,3 +750,48 @@ TEST_CASE(
     CHECK(off.norm() <= 3 * recoil * h + 1e-14 * v * h * (R + v * h) / radius);
   }
 }
+
+// Centres of grains, of which an overlap is taken away in the steps that follow. Seen to fail: what has used
+// up its share flies on through all that it meets, and the heavier one of two is charged in part (12 to 34 of
+// a block's 64 grains in the planet, 62 of 300 in a ball of ten times their mass).
+TEST_CASE(
+    "Grains that fly into something larger in one step do not end it inside, though they collapse on it") {
+  constexpr double h = 0.1;
+  const auto inside = [](const Space<double>& space, double R) {
+    int count = 0;
+    for (std::size_t i = 1; i < space.n(); ++i) {
+      count += (space.body(i).position() - space.body(std::size_t{0}).position()).norm() < R ? 1 : 0;
+    }
+    return count;
+  };
+  SimulationConfig<double> config = plain(h);
+  config.coeffFriction = config.coeffStaticFriction = 0.3;
+  for (const double e : {0.0, 0.5}) {
+    config.coeffRestitution = e;
+    for (const double mass : {1e2, 1e9}) {
+      Space<double> space(config);
+      space.addBody(ball({0, 0, 0}, {0, 0, 0}, 10, mass));
+      for (int k = 0; k < 64; ++k) {
+        space.addBody(ball({12.0 + k / 16, k / 4 % 4 - 1.5, k % 4 - 1.5}, {-10 / h, 0, 0}, 0.5));
+      }
+      const double energy = space.energyLedger().total();
+      space.computeDynamics(0);
+      CAPTURE(e, mass);
+      CHECK(space.contactReport().postponed > 20);
+      CHECK(space.contactReport().impacts < 64 * 100);
+      CHECK(inside(space, 10) == 0);
+      CHECK_THAT(space.energyLedger().total(), WithinRel(energy, 1e-13));
+    }
+  }
+  Space<double> space(config);
+  space.addBody(ball({0, 0, 0}, {0, 0, 0}, 3, 10));
+  constexpr int n = 300;
+  for (int i = 0; i < n; ++i) {
+    const double z = 1 - (2.0 * i + 1) / n;
+    const double turn = 2.399963 * i;  // the golden angle
+    const Vec out(std::sqrt(1 - z * z) * std::cos(turn), std::sqrt(1 - z * z) * std::sin(turn), z);
+    space.addBody(ball((4 + 5.0 * (i % 7)) * out, -20 / h * out, 0.2));
+  }
+  space.computeDynamics(0);
+  CHECK(inside(space, 3) == 0);
+}

@@ -23,12 +23,13 @@ struct ImpactSettings {
   Scalar epsilon = Scalar(0);               ///< [m] centres closer than this count as one point
   /// What strikes a body after so many impacts of it in the step stays in contact with it, so that no cascade
   /// goes on for ever. An impact counts 1 - e + 1/512, since only those that lose energy can go on for ever;
-  /// further bounces from the same partner, of which the number is bounded otherwise, 1/512. The heavier one
-  /// of two is charged a part of that by the ratio of their masses, and what cannot move nothing.
+  /// further bounces from the same partner, of which the number is bounded otherwise, 1/512. Of two the
+  /// lighter one is charged, or both of equal mass, and what cannot move never.
   static constexpr int mostPerBody = 8;
-  /// After so many of these, too, the body flies on until the end of the step, through what is in its way,
-  /// and is left to the solver of simultaneous contacts: a heavy one that presses a light one against a wall
-  /// would else go on for as many blows as the ratio of their masses.
+  /// After so many of these, too, the body flies on until the end of the step, through what is in its way
+  /// but for what is fixed or much heavier, and after as many again through that, too. It is left to the
+  /// solver of simultaneous contacts: a heavy one that presses a light one against a wall would else go on
+  /// for as many blows as the ratio of their masses.
   static constexpr int mostAfter = 64;
   /// After so many blows of both in a step two bodies that lean on each other are no longer driven together
   /// by others, unless faster than what they fall by in the step.
@@ -180,6 +181,7 @@ struct ImpactHistory {
   std::uint64_t partner = 0;  ///< of the last impact
   S spent = S(0);
   S after = S(0);        ///< charged since `mostPerBody` was spent
+  S heaviest = S(0);     ///< [kg] of those that it met
   bool free = false;     ///< let go: nothing holds it any more
   bool changed = false;  ///< it is among the ImpactPast::changed_
   bool ends = false;     ///< with a partner of a larger id, or a boundary, impacts of it came to an end

@@ -44,7 +44,7 @@ class ImpactForecast : protected ImpactPast<S> {
   using Base::histories_;
   using Base::isDecided;
   using Base::isHeld;
-  using Base::isLeftToSolver;
+  using Base::passes;
   using Event = ImpactEvent<S>;
   using Flight = ImpactFlight<S>;
 
@@ -195,7 +195,7 @@ class ImpactForecast : protected ImpactPast<S> {
   /// After a blow. What cannot move is on the same course as before, and meets others as was foreseen.
   template <class Scene>
   void predictAgain(const Scene& scene, std::span<const Pair> pairs, std::uint32_t body, const S& from) {
-    if (isLeftToSolver(scene, body) || !isMovable(scene.bodies, body)) {
+    if (!isMovable(scene.bodies, body)) {
       return;
     }
     pairsOf_.any(body, pairs, [&](std::uint32_t k) {
@@ -221,7 +221,7 @@ class ImpactForecast : protected ImpactPast<S> {
   template <class Scene>
   void predict(const Scene& scene, std::uint32_t body, std::uint32_t w, const S& from) {
     const HalfSpace<S>& wall = scene.walls[w];
-    if (isLeftToSolver(scene, body) || !swept_.mayMeet(body, wall, w)) {
+    if (!swept_.mayMeet(body, wall, w) || passes(scene, body, staticPartner)) {
       return;
     }
     const Flight one = flights_.of(scene, body);
@@ -246,7 +246,7 @@ class ImpactForecast : protected ImpactPast<S> {
     // Where images go no ways of their own none is nearer than that.
     const bool near = scene.domain.omega() != S(0) ||
                       swept_.mayMeet(i, j, scene.domain, scene.settings.time, scene.settings.h, r, drift);
-    if (!near || isLeftToSolver(scene, i) || isLeftToSolver(scene, j) || !canTouch(scene.bodies, i, j)) {
+    if (!near || passes(scene, i, j) || passes(scene, j, i) || !canTouch(scene.bodies, i, j)) {
       return;
     }
     const ContactKeys keys{scene.bodies.ids()[i], scene.bodies.ids()[j]};

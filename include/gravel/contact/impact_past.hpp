@@ -7,7 +7,9 @@
 #include <gravel/contact/contact_islands.hpp>
 #include <gravel/contact/impact_histories.hpp>
 #include <gravel/core/memory.hpp>
+#include <gravel/core/sizes.hpp>
 
+#include <algorithm>
 #include <limits>
 #include <span>
 #include <unordered_map>
@@ -135,33 +137,25 @@ class ImpactPast {
   bool bouncesNoMore(const Scene& scene, std::uint32_t body) const {
     return histories_.of(body).spent >= S(scene.settings.mostPerBody);
   }
-  /// It is left to the solver of simultaneous contacts.
+  /// Whether a body that is left to the solver of simultaneous contacts takes no notice of another one. What
+  /// it hardly moves stops it still: a boundary, what is fixed or much heavier, but of those that it has met
+  /// the heaviest alone, or it would bounce between two. So a grain stays on its planet, whatever presses it
+  /// on.
   template <class Scene>
-  bool isLeftToSolver(const Scene& scene, std::uint32_t body) const {
-    return histories_.of(body).after >= S(scene.settings.mostAfter);
+  bool passes(const Scene& scene, std::uint32_t body, std::uint32_t other) const {
+    const ImpactHistory<S>& past = histories_.of(body);
+    const S most = S(scene.settings.mostAfter);
+    if (!(past.after >= most)) {
+      return false;
+    }
+    const S its = weightOf(scene.bodies, other);
+    return past.after >= S(2) * most || its < past.heaviest || its / S(8) < S(scene.bodies.masses()[body]);
   }
 
-  /// The part of an impact that `body` is charged: of what a blow between equals does to it, all of it to the
-  /// lighter one. A large body may be struck by any number of grains in a step, which change its course by
-  /// little: charged as they are it bounced no more after sixteen, and the rest flew through it. Of two
-  /// movable bodies one at least is not the heavier one, whatever the rounding of their masses, and pays in
-  /// full; so does what meets a boundary or what cannot move. So there are no more impacts in a step than
-  /// bodies times those that use up the share of one, 8 * 512 + 64.
+  /// The mass of a body, for comparisons: no finite one of what nothing moves.
   template <class B>
-  static S chargeOf(const B& bodies, std::uint32_t body, std::uint32_t other) {
-    if (!isMovable(bodies, body)) {
-      return S(0);
-    }
-    if (other == staticPartner || !isMovable(bodies, other)) {
-      return S(1);
-    }
-    const S own = bodies.masses()[body];
-    const S its = bodies.masses()[other];
-    if (!(its < own)) {
-      return S(1);
-    }
-    const S ratio = its / own;  // the sum of two masses may be out of range
-    return S(2) * ratio / (S(1) + ratio);
+  static S weightOf(const B& bodies, std::uint32_t body) {
+    return body == staticPartner || !isMovable(bodies, body) ? highest<S>() : S(bodies.masses()[body]);
   }
 
   /// Enters a body into changed_, once.
@@ -184,11 +178,16 @@ class ImpactPast {
     const auto enter = [&](std::uint32_t body, std::uint32_t other, std::uint64_t partner) {
       ImpactHistory<S>& past = histories_.at(body);
       const bool before = bouncesNoMore(scene, body);
-      const S charge = chargeOf(scene.bodies, body, other);
+      // The lighter one of two pays, or both of equal mass. A large body may be struck by any number of
+      // grains in a step. One of the two always pays, so that there are no more impacts in a step than bodies
+      // times those that use up all that one has, 8 * 512 + 2 * 64.
+      const S its = weightOf(scene.bodies, other);
+      const S charge = isMovable(scene.bodies, body) && !(its < S(scene.bodies.masses()[body])) ? S(1) : S(0);
       const S least = S(1) / S(512);
       past.after += before ? charge : S(0);
       past.spent += charge * (past.impacts > 0 && past.partner == partner ? least : S(S(1) - e + least));
       past.partner = partner;
+      past.heaviest = std::max<S>(past.heaviest, its);
       past.impacts += isMovable(scene.bodies, body) ? 1U : 0U;  // or what is foreseen of it holds on
       report.postponed += bouncesNoMore(scene, body) && !before ? 1U : 0U;
     };
