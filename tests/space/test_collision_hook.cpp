@@ -133,6 +133,21 @@ TEST_CASE("Those that merge in a step are not taken apart before it ends") {
   }
 }
 
+// Seen to fail: the two that do not merge with each other taken apart, by 1.4e-3 J.
+TEST_CASE("Two that overlap, and merge with the same third in a step, are not taken apart before it ends") {
+  SimulationConfig<double> config = plain(0.02);
+  config.G = 1.0;
+  Space<double> space(config);
+  space.addBody(ball({-0.0995, 0, 0}, {0.09, -0.02, 0.37}, 0.1, 0.25));
+  space.addBody(ball({0.0995, 0, 0}, {-0.31, 0.99, 0.36}, 0.1, 0.25));
+  const BodyId third = space.addBody(ball({0.019, 0.394, 0}, {-1.9, -2.4, 0}, 0.3, 0.25));
+  space.setCollisionHook(
+      [&](const Hit& hit) { return hit.second.id == third ? Outcome::merge() : Outcome::bounce(); });
+  space.computeDynamics(0);
+  CHECK(space.n() == 1);
+  CHECK(space.energyLedger().correction == 0.0);
+}
+
 // Two equal ones without spin, that meet at a distance b of their ways: L = m v b/2 goes into the spin of one
 // of 2 m and radius 2^(1/3) r, so that what was m v^2/4 becomes L^2/(2 I), more if they graze. Nothing rubs.
 // Seen to fail: what their spins gain while they stick to each other until the step ends booked as friction

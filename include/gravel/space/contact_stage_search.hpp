@@ -3,6 +3,7 @@
 /// \file
 /// Members of `ContactStage` that look for contacts, and open them where they overlap.
 
+#include <gravel/core/disjoint_sets.hpp>
 #include <gravel/space/contact_stage.hpp>
 
 namespace gravel {
@@ -151,14 +152,20 @@ void ContactStage<Scalar, Layout>::separate(Bodies& bodies, const Config& config
     return;
   }
   const Profiler::Scope scope(profiler, Phase::PositionalCorrection);
-  // Of two that will be one by the end of this part of the step nothing is to be taken apart.
-  for (const auto& [one, other] : impacts_.merges()) {
-    const ContactKeys keys{toInteger(one), toInteger(other)};
-    const auto found = std::lower_bound(
-        contacts_.begin(), contacts_.end(), keys,
-        [](const Contact<Scalar>& c, const ContactKeys& wanted) { return c.keys() < wanted; });
-    if (found != contacts_.end() && found->keys() == keys) {
-      found->gap = std::max<Scalar>(found->gap, Scalar(0));
+  // Of those that will be one by the end of this part of the step, by whichever mergers, no two are taken
+  // apart.
+  if (!impacts_.merges().empty()) {
+    detail::DisjointSets ones;
+    ones.begin(bodies.size());
+    for (const auto& [one, other] : impacts_.merges()) {
+      ones.join(static_cast<std::uint32_t>(bodies.indexOf(one)),
+                static_cast<std::uint32_t>(bodies.indexOf(other)));
+    }
+    ones.end();
+    for (Contact<Scalar>& c : contacts_) {
+      if (c.second != staticPartner && ones.of(c.first) == ones.of(c.second)) {
+        c.gap = std::max<Scalar>(c.gap, Scalar(0));
+      }
     }
   }
   const CorrectionSettings<Scalar> settings{
