@@ -10,7 +10,8 @@
 
 namespace gravel {
 
-/// `Automatic` takes the method that is expected to be cheaper for the number of bodies and the tolerance.
+/// `Automatic` takes the method that is expected to be cheaper for the number of bodies, how many of them
+/// have mass, and the tolerance.
 enum class GravityKind { Automatic, Direct, FastMultipole };
 
 /// To add a method: one header with the same functions, a member, a name in the enumeration, and a case in
@@ -42,9 +43,22 @@ class GravitySolver {
     isOpen_ = domain.isOpen();
   }
 
-  /// The method for that many bodies, never `Automatic`. A function of the number, of the tolerance, of the
-  /// kind of domain, of the scalar and of the width of the lanes that the target has: a run that is taken up
-  /// again by the same program takes it again.
+  /// How many bodies, all with mass, give the direct sum as many pairs a body as these do: the sum looks at m
+  /// sources for each of n bodies, at two of them together once, where expansions cost what all n do. Fewer
+  /// than n where some are tracers; n where none is.
+  template <class Masses>
+  static std::size_t asMany(const Masses& masses) {
+    const std::size_t n = masses.size();
+    std::size_t m = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      m += S(masses[i]) > S(0) ? 1U : 0U;
+    }
+    return m == n ? n : m * (2 * n - m) / n;
+  }
+
+  /// The method for that many bodies with mass, never `Automatic`; see asMany(). A function of the number, of
+  /// the tolerance, of the kind of domain, of the scalar and of the width of the lanes that the target has: a
+  /// run that is taken up again by the same program takes it again.
   GravityKind choice(std::size_t bodies) const {
     if (kind_ != GravityKind::Automatic) {
       return kind_;
@@ -72,8 +86,7 @@ class GravitySolver {
       }
       return;
     }
-    visit(positions.size(),
-          [&](auto& method) { method.accelerations(positions, masses, G, softening, out); });
+    visit(masses, [&](auto& method) { method.accelerations(positions, masses, G, softening, out); });
   }
 
   /// The same for bodies of these numbers only; see DirectSum. The method is that for all bodies.
@@ -89,7 +102,7 @@ class GravitySolver {
       }
       return;
     }
-    visit(positions.size(),
+    visit(masses,
           [&](auto& method) { method.accelerationsOf(numbers, positions, masses, G, softening, out); });
   }
 
@@ -100,8 +113,7 @@ class GravitySolver {
     if (G == S(0)) {
       requireAll(positions, masses, softening);
     } else {
-      visit(positions.size(),
-            [&](auto& method) { energy = method.potentialEnergy(positions, masses, G, softening); });
+      visit(masses, [&](auto& method) { energy = method.potentialEnergy(positions, masses, G, softening); });
     }
     return energy;
   }
@@ -126,9 +138,9 @@ class GravitySolver {
     detail::require("softening", softening, detail::nonNegative<S>());
   }
 
-  template <class F>
-  void visit(std::size_t bodies, F&& f) {
-    if (choice(bodies) == GravityKind::Direct) {
+  template <class Masses, class F>
+  void visit(const Masses& masses, F&& f) {
+    if (choice(asMany(masses)) == GravityKind::Direct) {
       f(direct_);
     } else {
       f(multipoles_);

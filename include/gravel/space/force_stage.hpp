@@ -90,7 +90,7 @@ class ForceStage {
     if (reason == nullptr) {
       gravity.setDomain(domain, time);
       const Profiler::Scope scope(profiler, Phase::Gravity);
-      profiler.method(Phase::Gravity, gravity.name(n));
+      profiler.method(Phase::Gravity, gravity.name(gravity.asMany(bodies.masses())));
       gravity.accelerations(bodies.positions(), bodies.masses(), G, softening, bodies.accelerations());
     } else {
       profiler.skip(Phase::Gravity, reason);

@@ -51,7 +51,7 @@ std::size_t Space<Scalar, Layout>::moveFewPoints(const Scalar& h, const Scalar* 
     contact_dt_ = h;
     forcesValid_ = false;  // if gravity throws
     force_.gravity.setDomain(contact_.domain, time_);
-    profiler_.method(Phase::Gravity, force_.gravity.name(n()));
+    profiler_.method(Phase::Gravity, force_.gravity.name(force_.gravity.asMany(bodies_.masses())));
     FewPoints<Scalar> points;
     points.load(bodies_, lost);
     const auto gravity = [&](const auto& positions, const auto& masses, const auto& accelerations) {
