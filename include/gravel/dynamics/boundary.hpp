@@ -178,13 +178,14 @@ class Boundaries {
   }
 
  private:
+  /// O(log planes).
   std::size_t indexOf(std::size_t number) const {
-    for (std::size_t p = 0; p < planes_.size(); ++p) {
-      if (planes_[p].number == number) {
-        return p;
-      }
+    const auto before = [&](const Plane<Scalar>& plane) { return plane.number < number; };
+    const auto place = std::partition_point(planes_.begin(), planes_.end(), before);
+    if (place == planes_.end() || place->number != number) {
+      throw std::out_of_range("gravel: no plane has the number " + std::to_string(number));
     }
-    throw std::out_of_range("gravel: no plane has the number " + std::to_string(number));
+    return static_cast<std::size_t>(place - planes_.begin());
   }
 
   std::vector<Plane<Scalar>> planes_;
