@@ -489,6 +489,25 @@ TEST_CASE("What meets a fixed body merges into it") {
   CHECK_THAT(space.energyLedger().total(), WithinRel(before, 1e-13));
 }
 
+// By pairs with all others each costs O(N): so many are booked together, by the ledger's own sums.
+TEST_CASE("What hundreds of mergers in one step do to the potential is in the ledger as well") {
+  SimulationConfig<double> config = bouncy(1e-6);
+  config.G = 1e-2;
+  Space<double> space(config);
+  for (int i = 0; i < 300; ++i) {
+    const Vec x(4.0 * (i % 7), 4.0 * (i / 7 % 7), 4.0 * (i / 49));
+    space.addBody(ball(x, {1, 0.3, 0}, 1.0));
+    space.addBody(ball(x + Vec(2.0 + 1e-6, 0, 0), {-1, 0, 0}, 1.0));
+  }
+  space.setCollisionHook(mergeAll);
+  const EnergyLedger<double> before = space.energyLedger();
+  space.computeDynamics(0);
+  REQUIRE(space.n() == 300);
+  const EnergyLedger<double> after = space.energyLedger();
+  CHECK(std::abs(after.exchange) > 0.01 * std::abs(before.potential));
+  CHECK_THAT(after.total(), WithinRel(before.total(), 1e-12));  // what a step of 1e-6 loses, too
+}
+
 // A dense gas in which slow hits merge: several in a step, chains among them. Momentum is kept through all of
 // it, threads change no bit, and a restart goes on with the same bits.
 TEST_CASE("Many merges: momentum and mass are kept, by any number of threads and through a file") {

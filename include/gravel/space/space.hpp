@@ -268,12 +268,12 @@ class Space : public Settings<Scalar> {
   typename ContactStage<Scalar, Layout>::Touches allTouches() const;
   void rememberPlaces();
   bool placesChanged() const;
-  Scalar bindingEnergy(std::size_t i, const Scalar& time) const;
+  Scalar bindingEnergy(std::size_t i, const Scalar& time, const Scalar& G) const;
   BodyPairs decideCollisions(const Scalar& time);
   BodyPairs decideTouching(const Scalar& time, const Scalar& h, bool begins, BodyPairs& decided);
   void mergeCollided(const BodyPairs& merges, const Scalar& time);
-  void merge(BodyId stays, BodyId goes, const Scalar& time);
-  Scalar pairEnergy(std::size_t i, std::size_t j, const Scalar& time) const;
+  void merge(BodyId stays, BodyId goes, const Scalar& time, const Scalar& G);
+  Scalar pairEnergy(std::size_t i, std::size_t j, const Scalar& time, const Scalar& G) const;
   Scalar potentialEnergy() const;
   template <class Part>
   void changePotential(Part& part, const Part& next);

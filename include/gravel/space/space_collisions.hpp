@@ -48,6 +48,10 @@ BodyPairs Space<Scalar, Layout>::decideTouching(const Scalar& time, const Scalar
   return std::move(outcomes.merges);
 }
 
+/// From so many mergers on, what they did to the energy of mutual gravity is found for all together: by pairs
+/// each costs O(N), which is as much for a few hundred as two sums over everybody by expansions.
+inline constexpr std::size_t manyMergers = 256;
+
 /// One after the other. Of two, the fixed one stays, else the heavier, else the one of the smaller id; a
 /// third that meets the one that went meets the one that stayed.
 template <Real Scalar, class Layout>
@@ -62,6 +66,13 @@ void Space<Scalar, Layout>::mergeCollided(const BodyPairs& merges, const Scalar&
     }
     return id;
   };
+  const bool together = merges.size() >= manyMergers;
+  const auto pull = [&] {  // [J] of all
+    force_.gravity.setDomain(contact_.domain, time);
+    return force_.gravity.potentialEnergy(bodies_.positions(), bodies_.masses(), getG(),
+                                          this->config_.softening);
+  };
+  const Scalar before = together ? pull() : Scalar(0);
   for (const auto& [id1, id2] : merges) {
     BodyId stays = present(id1);
     BodyId goes = present(id2);
@@ -80,16 +91,18 @@ void Space<Scalar, Layout>::mergeCollided(const BodyPairs& merges, const Scalar&
       std::swap(stays, goes);
     }
     heir.emplace(toInteger(goes), stays);
-    merge(stays, goes, time);
+    merge(stays, goes, time, together ? Scalar(0) : getG());
   }
+  left_.exchange += together ? Scalar(before - pull()) : Scalar(0);
   if (this->config_.sleepSpeed > Scalar(0)) {
     sleep_.startAnew(bodies_, merges);
   }
   forcesValid_ = false;
 }
 
+/// \param G  0: what mutual gravity gives or takes is booked elsewhere
 template <Real Scalar, class Layout>
-void Space<Scalar, Layout>::merge(BodyId stays, BodyId goes, const Scalar& time) {
+void Space<Scalar, Layout>::merge(BodyId stays, BodyId goes, const Scalar& time, const Scalar& G) {
   const std::size_t i = bodies_.indexOf(stays);
   const std::size_t j = bodies_.indexOf(goes);
   const Body<Scalar> a = bodies_[i].load();
@@ -110,7 +123,7 @@ void Space<Scalar, Layout>::merge(BodyId stays, BodyId goes, const Scalar& time)
   const Scalar seen = sped + b.mass * (frame.potential(Vector(b.position + shift)) -
                                        frame.potential(b.position) - force_.field.dot(shift));
   const Scalar motion = bodies_[i].kineticEnergy() + bodies_[j].kineticEnergy() + sped;
-  const Scalar energy = bindingEnergy(i, time) + bindingEnergy(j, time) - pairEnergy(i, j, time);
+  const Scalar energy = bindingEnergy(i, time, G) + bindingEnergy(j, time, G) - pairEnergy(i, j, time, G);
   const Vector pull = Vector(bodies_[i].force()) + Vector(bodies_[j].force());
   const auto [one, k] =
       detail::mergedByFactors<Scalar>(a, factorOf(bodies_[i]), b, factorOf(bodies_[j]), r_ab, v_ab,
@@ -126,7 +139,7 @@ void Space<Scalar, Layout>::merge(BodyId stays, BodyId goes, const Scalar& time)
   const Scalar lost = motion - bodies_[now].kineticEnergy();
   left_.restitution += lost;
   left_.work -= seen;
-  left_.exchange += energy + seen - bindingEnergy(now, time) - lost;  // of the potential
+  left_.exchange += energy + seen - bindingEnergy(now, time, G) - lost;  // of the potential
 }
 
 }  // namespace gravel

@@ -51,7 +51,8 @@ BodyId Space<Scalar, Layout>::addBody(const Body<Scalar>& body) {
   contact_.materials.check(static_cast<std::uint32_t>(body.material), "the new body");
   Scalar energy(0);
   const BodyId id = bodies_.add(body, bodies_.nextId(), [&](std::size_t i) {
-    energy = ledgerOpen_ ? bindingEnergy(i, time_) : energy;  // throws if another body is not what it may be
+    // Throws if another body is not what it may be.
+    energy = ledgerOpen_ ? bindingEnergy(i, time_, getG()) : energy;
   });
   left_.exchange -= energy;
   forcesValid_ = false;
@@ -67,7 +68,7 @@ void Space<Scalar, Layout>::removeBody(BodyId id) {
     const Scalar m = bodies_.masses()[k];
     known = isFinite(Vector(bodies_.positions()[k])) && isFinite(m) && m >= Scalar(0);
   }
-  const Scalar energy = known ? bindingEnergy(i, time_) : Scalar(0);
+  const Scalar energy = known ? bindingEnergy(i, time_, getG()) : Scalar(0);
   bodies_.remove(id);
   if (isFinite(energy)) {  // who has written what is no number must be able to get rid of it
     left_.exchange += energy;
@@ -237,8 +238,9 @@ void Space<Scalar, Layout>::changePotential(Part& part, const Part& next) {
 
 /// Potential energy of a pair [J], with that of their images but without that of each and its own.
 template <Real Scalar, class Layout>
-Scalar Space<Scalar, Layout>::pairEnergy(std::size_t i, std::size_t j, const Scalar& time) const {
-  if (getG() == Scalar(0)) {  // in a domain of any length
+Scalar Space<Scalar, Layout>::pairEnergy(std::size_t i, std::size_t j, const Scalar& time,
+                                         const Scalar& G) const {
+  if (G == Scalar(0)) {  // in a domain of any length
     return Scalar(0);
   }
   const std::array<Vector, 2> x{bodies_[i].position(), bodies_[j].position()};
@@ -246,13 +248,12 @@ Scalar Space<Scalar, Layout>::pairEnergy(std::size_t i, std::size_t j, const Sca
   const std::array<Scalar, 2> alone{m[0], Scalar(0)};
   force_.gravity.setDomain(contact_.domain, time);
   const Scalar& softening = this->config_.softening;
-  return force_.gravity.energyOf(0, x, m, getG(), softening) -
-         force_.gravity.energyOf(0, x, alone, getG(), softening);
+  return force_.gravity.energyOf(0, x, m, G, softening) - force_.gravity.energyOf(0, x, alone, G, softening);
 }
 
 /// Kinetic energy of body i and its share of the potential: what leaves with it. O(N).
 template <Real Scalar, class Layout>
-Scalar Space<Scalar, Layout>::bindingEnergy(std::size_t i, const Scalar& time) const {
+Scalar Space<Scalar, Layout>::bindingEnergy(std::size_t i, const Scalar& time, const Scalar& G) const {
   const auto one = bodies_[i];
   const Scalar m = one.mass();
   const Vector x = one.position();
@@ -260,12 +261,12 @@ Scalar Space<Scalar, Layout>::bindingEnergy(std::size_t i, const Scalar& time) c
   if (!one.isFixed()) {
     energy += m * (HillFrame<Scalar>(contact_.domain).potential(x) - force_.field.dot(x));
   }
-  if (getG() == Scalar(0)) {
+  if (G == Scalar(0)) {
     return energy;
   }
   force_.gravity.setDomain(contact_.domain, time);
   return energy +
-         force_.gravity.energyOf(i, bodies_.positions(), bodies_.masses(), getG(), this->config_.softening);
+         force_.gravity.energyOf(i, bodies_.positions(), bodies_.masses(), G, this->config_.softening);
 }
 
 }  // namespace gravel
