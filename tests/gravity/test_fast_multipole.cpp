@@ -295,7 +295,7 @@ TEMPLATE_TEST_CASE("the same bits for 1, 2, 3 and 8 threads, and for a used obje
   for (const std::string scene : {"Plummer sphere", "nine decades of mass", "dense half"}) {
     CAPTURE(scene);
     const bool dense = scene == "dense half";
-    const S softening(dense ? 0.05 : 0.0);
+    const S softening = dense ? S(0.05) : S(0);
     auto points = dense ? denseHalf<S>(4000, S(1e-4), true) : gravityScene<S>(scene, 3000);
     for (std::size_t i = 0; !dense && i < points.size(); i += 5) {
       points.masses[i] = S(0);
