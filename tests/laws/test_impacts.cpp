@@ -783,15 +783,28 @@ TEST_CASE(
       CHECK_THAT(space.energyLedger().total(), WithinRel(energy, 1e-13));
     }
   }
-  Space<double> space(config);
-  space.addBody(ball({0, 0, 0}, {0, 0, 0}, 3, 10));
+  // 300 on a free ball of ten times their mass from all sides, and on one of twenty times their mass that
+  // lies on a floor from half of them. Who went through would end the step at its centre. (Seen to fail on
+  // the floor: each grain between two of its blows made the floor a new partner of the ball.)
   constexpr int n = 300;
-  for (int i = 0; i < n; ++i) {
-    const double z = 1 - (2.0 * i + 1) / n;
-    const double turn = 2.399963 * i;  // the golden angle
-    const Vec out(std::sqrt(1 - z * z) * std::cos(turn), std::sqrt(1 - z * z) * std::sin(turn), z);
-    space.addBody(ball((4 + 5.0 * (i % 7)) * out, -20 / h * out, 0.2));
+  for (const bool onFloor : {false, true}) {
+    for (const double e : {0.0, 0.5}) {
+      config.coeffRestitution = e;
+      Space<double> space(config);
+      space.addBody(ball({0, 0, 0}, {0, 0, 0}, 3, onFloor ? 20 : 10));
+      if (onFloor) {
+        space.addPlane({0, 0, 1}, -3);
+      }
+      for (int i = 0; i < n; ++i) {
+        const double z = 1 - (onFloor ? i + 0.5 : 2.0 * i + 1) / n;
+        const double turn = 2.399963 * i;  // the golden angle
+        const Vec out(std::sqrt(1 - z * z) * std::cos(turn), std::sqrt(1 - z * z) * std::sin(turn), z);
+        const double far = 4 + 5.0 * (i % 7);
+        space.addBody(ball(far * out, -far / h * out, 0.2));
+      }
+      space.computeDynamics(0);
+      CAPTURE(onFloor, e);
+      CHECK(inside(space, 3) == 0);
+    }
   }
-  space.computeDynamics(0);
-  CHECK(inside(space, 3) == 0);
 }

@@ -27,9 +27,9 @@ struct ImpactSettings {
   /// lighter one is charged, or both of equal mass, and what cannot move never.
   static constexpr int mostPerBody = 8;
   /// After so many of these, too, the body flies on until the end of the step, through what is in its way
-  /// but for what is fixed or much heavier, and after as many again through that, too. It is left to the
-  /// solver of simultaneous contacts: a heavy one that presses a light one against a wall would else go on
-  /// for as many blows as the ratio of their masses.
+  /// but for what is fixed or much heavier, of those that it met none lighter than the heaviest, and after as
+  /// many again through that, too. It is left to the solver of simultaneous contacts: a heavy one that
+  /// presses a light one against a wall would else go on for as many blows as the ratio of their masses.
   static constexpr int mostAfter = 64;
   /// After so many blows of both in a step two bodies that lean on each other are no longer driven together
   /// by others, unless faster than what they fall by in the step.

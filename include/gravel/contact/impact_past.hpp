@@ -33,7 +33,7 @@ class ImpactPast {
     changed_.clear();
     islandsKnown_ = false;
     clearSpare(impacts_);
-    endings_.clear();
+    forgetEndings();
     merges_.clear();
     cleared_ = true;
   }
@@ -45,7 +45,7 @@ class ImpactPast {
     giveBack(struck_);
     giveBack(changed_);
     islands_ = {};
-    endings_ = {};
+    forgetEndings();
   }
 
   /// For the impacts of so many bodies, of which so many pairs may meet.
@@ -179,14 +179,15 @@ class ImpactPast {
       ImpactHistory<S>& past = histories_.at(body);
       const bool before = bouncesNoMore(scene, body);
       // The lighter one of two pays, or both of equal mass. A large body may be struck by any number of
-      // grains in a step. One of the two always pays, so that there are no more impacts in a step than bodies
-      // times those that use up all that one has, 8 * 512 + 2 * 64.
+      // grains in a step, and its own partner is the one that it pays for: a floor that they drive it
+      // against. One of the two always pays, so that there are no more impacts in a step than bodies times
+      // those that use up all that one has, 8 * 512 + 2 * 64.
       const S its = weightOf(scene.bodies, other);
       const S charge = isMovable(scene.bodies, body) && !(its < S(scene.bodies.masses()[body])) ? S(1) : S(0);
       const S least = S(1) / S(512);
       past.after += before ? charge : S(0);
       past.spent += charge * (past.impacts > 0 && past.partner == partner ? least : S(S(1) - e + least));
-      past.partner = partner;
+      past.partner = charge > S(0) ? partner : past.partner;
       past.heaviest = std::max<S>(past.heaviest, its);
       past.impacts += isMovable(scene.bodies, body) ? 1U : 0U;  // or what is foreseen of it holds on
       report.postponed += bouncesNoMore(scene, body) && !before ? 1U : 0U;
@@ -203,6 +204,13 @@ class ImpactPast {
       } else if (ending == Ending::None) {
         ending = Ending::Rest;
       }
+    }
+  }
+
+  /// With their room: to clear it takes as long as it is large.
+  void forgetEndings() {
+    if (!endings_.empty()) {
+      endings_ = decltype(endings_)();
     }
   }
 

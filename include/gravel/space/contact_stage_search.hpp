@@ -152,8 +152,7 @@ void ContactStage<Scalar, Layout>::separate(Bodies& bodies, const Config& config
     return;
   }
   const Profiler::Scope scope(profiler, Phase::PositionalCorrection);
-  // Of those that will be one by the end of this part of the step, by whichever mergers, no two are taken
-  // apart.
+  // Of those that the impacts of this part of the step make one, no two are taken apart.
   if (!impacts_.merges().empty()) {
     detail::DisjointSets ones;
     ones.begin(bodies.size());
