@@ -260,13 +260,8 @@ std::optional<std::span<const std::uint32_t>> ContactStage<Scalar, Layout>::near
   }
   // Who looks for neighbours may not look for boundaries: whether the last update searched is not enough.
   const bool stale = std::exchange(searchesForWalls_, neighbours_.searches()) != neighbours_.searches();
-  struct Reaches {
-    detail::RestingReaches<Bodies> radii;
-    const NeighbourList<Scalar>& neighbours;
-    Scalar operator[](std::size_t i) const { return radii[i] + Scalar(2) * neighbours.more(i); }
-  };
-  const Reaches reaches{{bodies}, neighbours_};
-  return nearWalls_.update(bodies.positions(), reaches, walls_, stale, neighbours_.skin(), Scalar(0), h);
+  return nearWalls_.update(bodies.positions(), detail::RestingReaches<Bodies>{bodies}, walls_, stale,
+                           neighbours_.skin(), Scalar(0), h);
 }
 
 template <Real Scalar, class Layout>

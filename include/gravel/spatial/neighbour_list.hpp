@@ -18,8 +18,7 @@ namespace gravel {
 /// still, and what the flow itself can bring a touching pair nearer is taken off the skin. A list can be
 /// asked to hold for a whole step, along ways of which the ends and the bends are known. A few bodies that
 /// leave their half of the skin, bullets among grains, do not spoil it: each of them is compared with all
-/// others, until a new search is cheaper. Nor do, without shear, what most have in common, a pile in orbit,
-/// and ways far longer than most: who is on one has a wider reach of his own.
+/// others, until a new search is cheaper. Nor does, without shear, what most have in common: a pile in orbit.
 template <Real S>
 class NeighbourList {
  public:
@@ -54,7 +53,7 @@ class NeighbourList {
     parallelForTasks(swift_.size(), [&](std::size_t k) {
       swiftPairs_[k].clear();
       detail::compare(swift_[k], positions, radii, ids, detail::wayOf<S>(rest, swift_[k]), rest,
-                      common_.ahead(), slack_, free_, leeways_, bend_, domain_, now_, S(0), swiftPairs_[k]);
+                      common_.ahead(), slack_, free_, bend_, domain_, now_, S(0), swiftPairs_[k]);
     });
     for (std::size_t k = 0; k < swift_.size(); ++k) {
       extra_.insert(extra_.end(), swiftPairs_[k].begin(), swiftPairs_[k].end());
@@ -71,12 +70,12 @@ class NeighbourList {
   template <class Positions, class Radii, class Ids, class Travel>
   void follow(std::uint32_t i, const Positions& positions, const Radii& radii, const Ids& ids,
               const Vector3<S>& way, const Travel& travel, std::vector<Pair>& out, const S& share = S(0)) {
-    if (!leeways_.hold(i, withBend_sq(farthest_sq(i, positions[i], way), i, travel))) {
+    if (!(withBend_sq(farthest_sq(i, positions[i], way), i, travel) <= half_ * half_)) {
       ++comparisons_;
       strays_ = true;
       detail::compare(i, positions, radii, ids, common_.lessThis(Vector3<S>(positions[i]), way),
-                      common_.lessThis(positions, travel), common_.ahead(), slack_, free_, leeways_, bend_,
-                      domain_, now_, share, out);
+                      common_.lessThis(positions, travel), common_.ahead(), slack_, free_, bend_, domain_,
+                      now_, share, out);
     }
   }
 
@@ -107,8 +106,7 @@ class NeighbourList {
            : !common_.isNone() ? "no body has left the others by half the skin since the last search"
                                : "no body has moved half the skin since the last search";
   }
-  const S& skin() const { return skin_; }              ///< [m] of the list in use
-  S more(std::size_t i) const { return leeways_(i); }  ///< [m] by which i may get farther than half of it
+  const S& skin() const { return skin_; }  ///< [m] of the list in use
   /// [m] >= 0 from the next search on, or chosen by the motion. A thick one: few searches, many candidates.
   void setSkin(std::optional<S> skin) {
     if (skin) {
@@ -170,7 +168,7 @@ class NeighbourList {
       const auto bend = [&](std::size_t i) { return S(common + detail::mostBendOf<S>(travel, i)); };
       const auto farthest = [&](std::size_t i) { return withBend_sq(straight(i), i, travel); };
       const auto same = [&](std::size_t i) { return radii[i] == radii_[i]; };
-      leeways_.look(parts_[begin / chunk], begin, end, straight, bend, farthest, same);
+      parts_[begin / chunk].look(begin, end, half_, straight, bend, farthest, same);
     });
     moved_sq_ = bend_ = S(0);
     swift_.clear();
@@ -185,7 +183,7 @@ class NeighbourList {
     if (comparisons_ + swift_.size() <= mostComparisons && swift_.size() <= mostSwift(n)) {
       return nullptr;
     }
-    moved_sq_ = std::max<S>(moved_sq_, leeways_.half() * leeways_.half());
+    moved_sq_ = std::max<S>(moved_sq_, half_ * half_);
     for (std::size_t c = 0; c < parts_.size() && swift_.size() > mostSwift(n); ++c) {
       moved_sq_ = std::max<S>(moved_sq_, parts_[c].most_sq);
     }
@@ -219,7 +217,7 @@ class NeighbourList {
   /// How far a body may get, less what subtraction loses: a few units in its last place.
   void setHalf() {
     const S half = free_ / S(2) - S(16) * detail::roundoff<S>() * common_.most();
-    leeways_.setHalf(half > S(0) ? half : S(0));
+    half_ = half > S(0) ? half : S(0);
   }
 
   template <class Ids>
@@ -256,23 +254,23 @@ class NeighbourList {
     swift_.clear();
     flow_ = S(0);
     common_.clear();
-    std::vector<S> ways;
     if constexpr (!std::is_same_v<Travel, AtRest>) {
       if (domain.omega() == S(0)) {
         common_.findAhead(n, travel, S(skin_ / S(8)));
       }
       bend_ += detail::sumAbs(common_.bend());
-      skin_ = detail::takeSwift(n, mostSwift(n), skin_, common_.lessThis(positions, travel), swift_,
-                                domain.omega() == S(0) && !spheres.empty(), ways);
+      skin_ = std::max<S>(
+          skin_, detail::takeSwift(n, mostSwift(n), skin_, common_.lessThis(positions, travel), swift_));
     }
     free_ = skin_;
     setHalf();
-    leeways_.widen(std::move(ways), swift_);
     comparisons_ = 0;
     room_ = alongside(margin, common_.shearing()) + skin_ * common_.spread();
+    // Distances at both times and the displacement are rounded: a few units of what is subtracted.
     const S scale =
         S(2) * largest_ + room_ + common_.most() + (domain.isOpen() ? S(0) : S(domain.lengths().maxCoeff()));
-    leeways_.search(search_, positions, radii_, ids, room_, scale, domain, time, pairs_);
+    const S slack = S(32) * detail::roundoff<S>() * scale;
+    search_.findPairs(positions, radii, ids, S(room_ + slack), domain, time, pairs_);
     revision_ = revision;
     domain_ = domain;
     time_ = time;
@@ -298,12 +296,13 @@ class NeighbourList {
   Domain<S> domain_;
   S time_ = S(0);
   S now_ = S(0);  ///< of the last update
-  S largest_ = S(0), skin_ = S(0);
+  S largest_ = S(0);
+  S skin_ = S(0);
   S room_ = S(0);   ///< margin and skin of the last search
   S free_ = S(0);   ///< what is left of the skin
   S slack_ = S(0);  ///< what else the margin of the last update wants
-  detail::Leeways<S> leeways_;
-  S bend_ = S(0);  ///< of any way, at most
+  S half_ = S(0);   ///< how far a body may get
+  S bend_ = S(0);   ///< of any way, at most
   detail::CommonMotion<S> common_;
   S flow_ = S(0);  ///< [1] shear since the last search
   S moved_sq_ = S(0);
@@ -314,7 +313,8 @@ class NeighbourList {
   std::uint64_t searches_ = 0;
   const char* reason_ = nullptr;
   bool strays_ = false;
-  bool built_ = false, rebuilt_ = false;
+  bool built_ = false;
+  bool rebuilt_ = false;
 };
 
 }  // namespace gravel

@@ -8,8 +8,6 @@
 #include <gravel/spatial/common_motion.hpp>
 #include <gravel/spatial/pair.hpp>
 
-#include <span>
-
 namespace gravel {
 
 namespace detail {
@@ -17,7 +15,7 @@ namespace detail {
 /// How far some bodies got from where a search saw them, and which of them too far.
 template <Real S>
 struct Wandering {
-  S moved_sq = S(0);  ///< most of those that did not get too far, and may no farther than others
+  S moved_sq = S(0);  ///< most of those that did not get too far
   S most_sq = S(0);   ///< most of the others, the swift
   S bend = S(0);      ///< [m] the most
   bool otherRadius = false;
@@ -25,18 +23,17 @@ struct Wandering {
   std::vector<std::uint32_t> swift;
 
   /// For bodies [begin, end).
-  /// \param half [m] all may get so far \param more  more(i): and this one so much farther \param straight,
-  /// farthest  straight(i): squared distance [m^2] along the chord, NaN where a coordinate
+  /// \param straight, farthest  straight(i): squared distance [m^2] along the chord, NaN where a coordinate
   ///   is; farthest(i): on the path \param mostBend  mostBend(i): no more than this [m] are they apart
   /// \param same  same(i): whether the radius is what it was
-  template <class More, class Straight, class MostBend, class Farthest, class Same>
-  void look(std::size_t begin, std::size_t end, const S& half, More&& more, Straight&& straight,
-            MostBend&& mostBend, Farthest&& farthest, Same&& same) {
+  template <class Straight, class MostBend, class Farthest, class Same>
+  void look(std::size_t begin, std::size_t end, const S& within, Straight&& straight, MostBend&& mostBend,
+            Farthest&& farthest, Same&& same) {
     moved_sq = most_sq = bend = S(0);
     lost = false;
     swift.clear();
     const auto isNear = [&](std::size_t i, const S& d_sq) {
-      const S left = half + more(i) - mostBend(i);
+      const S left = within - mostBend(i);
       return d_sq <= left * sizeOf(left);
     };
     // Mostly all are near: first a loop without branches.
@@ -47,7 +44,7 @@ struct Wandering {
       const S d_sq = straight(i);
       near = near & isNear(i, d_sq);
       alike = alike & same(i);
-      most = d_sq > most && !(more(i) > S(0)) ? d_sq : most;
+      most = d_sq > most ? d_sq : most;
       bend = std::max<S>(bend, mostBend(i));
     }
     otherRadius = !alike;
@@ -58,8 +55,8 @@ struct Wandering {
     for (std::size_t i = begin; i < end; ++i) {
       S d_sq = straight(i);
       d_sq = isNear(i, d_sq) ? d_sq : farthest(i);
-      if (const S within = half + more(i); d_sq <= within * within) {
-        moved_sq = more(i) > S(0) ? moved_sq : std::max<S>(moved_sq, d_sq);
+      if (d_sq <= within * within) {
+        moved_sq = std::max<S>(moved_sq, d_sq);
       } else {
         swift.push_back(static_cast<std::uint32_t>(i));
         lost = lost || !isFinite(d_sq);
@@ -67,75 +64,6 @@ struct Wandering {
       }
     }
   }
-};
-
-/// How far each body may get from where a search saw it: half the skin, or as far as the way that it was on
-/// then. (One skin for all that ten bullets ask for makes all pairs of what they fly through.)
-template <Real S>
-class Leeways {
- public:
-  /// [m] What is half of the skin by now.
-  void setHalf(const S& half) { half_ = half; }
-  const S& half() const { return half_; }
-
-  /// \param ways  squares [m^2] of the ways that bodies are on; empty where half the skin is enough for all
-  /// \param swift  that are looked for otherwise
-  void widen(std::vector<S>&& ways, std::span<const std::uint32_t> swift) {
-    using std::sqrt;
-    more_ = std::move(ways);
-    for (const std::uint32_t i : more_.empty() ? std::span<const std::uint32_t>() : swift) {
-      more_[i] = S(0);
-    }
-    most_ = S(0);
-    for (S& more : more_) {
-      more = std::max<S>(S(0), S(S(sqrt(more)) * (S(1) + S(16) * roundoff<S>()) - half_));
-      most_ = std::max<S>(most_, more);
-    }
-  }
-
-  /// [m] What body i has beyond half the skin, and the most of all.
-  S operator()(std::size_t i) const { return more_.empty() ? S(0) : more_[i]; }
-  const S& most() const { return most_; }
-  /// Whether it has not got farther than it may. \param d_sq [m^2]
-  bool hold(std::size_t i, const S& d_sq) const {
-    const S within = half_ + (*this)(i);
-    return d_sq <= within * within;
-  }
-  /// part.look() of `Wandering`, with the cheaper one of two functions where it can be had.
-  template <class... Functions>
-  void look(Wandering<S>& part, std::size_t begin, std::size_t end, Functions&&... of) const {
-    if (more_.empty()) {
-      part.look(
-          begin, end, half_, [](std::size_t /*body*/) { return S(0); }, of...);
-    } else {
-      part.look(
-          begin, end, half_, [this](std::size_t i) { return more_[i]; }, of...);
-    }
-  }
-
-  /// As search.findPairs(), with as much more reach. Two points are no pair however far they may get.
-  /// \param scale [m] of which distances at both times and displacements are subtracted: a few units of their
-  ///   last place are lost
-  template <class Search, class Positions, class Ids>
-  void search(Search& search, const Positions& positions, const std::vector<S>& radii, const Ids& ids,
-              const S& room, const S& scale, const Domain<S>& domain, const S& time,
-              std::vector<Pair>& pairs) const {
-    const S margin = room + S(32) * roundoff<S>() * (scale + S(2) * most_);
-    if (more_.empty()) {
-      return search.findPairs(positions, radii, ids, margin, domain, time, pairs);
-    }
-    std::vector<S> reaches(radii);
-    for (std::size_t i = 0; i < reaches.size(); ++i) {
-      reaches[i] += more_[i];
-    }
-    search.findPairs(positions, reaches, ids, margin, domain, time, pairs);
-    std::erase_if(pairs, [&](const Pair& p) { return !(radii[p.first] + radii[p.second] > S(0)); });
-  }
-
- private:
-  S half_ = S(0);
-  S most_ = S(0);
-  std::vector<S> more_;
 };
 
 /// [m] So thick that a list would hold for sixteen updates of the motion last seen, within a fraction of the
@@ -164,14 +92,12 @@ S skinFor(std::vector<S>& radii, const S& perUpdate) {
 /// \param travel `travel(j)`: way [m] of body j; `AtRest` for none
 /// \param ahead [1] of CommonMotion, less whose frame these ways are
 /// \param slack [m] added to the sum of the radii
-/// \param free [m] what is left of the skin \param more  more(j): by which j may get farther than half of it
-/// \param most [m] bend of any
+/// \param free [m] what is left of the skin \param most [m] bend of any
 /// \param share [1] of the ways after which the image that is nearest is looked at: see Domain::imageAt()
-template <Real S, class Positions, class Radii, class Ids, class Travel, class More>
+template <Real S, class Positions, class Radii, class Ids, class Travel>
 void compare(std::uint32_t i, const Positions& positions, const Radii& radii, const Ids& ids,
              const Vector3<S>& own, const Travel& travel, const S& ahead, const S& slack, const S& free,
-             const More& more, const S& most, const Domain<S>& domain, const S& time, const S& share,
-             std::vector<Pair>& out) {
+             const S& most, const Domain<S>& domain, const S& time, const S& share, std::vector<Pair>& out) {
   const Vector3<S> x = positions[i];
   Vector3<S> way = own;
   S length_sq = way.squaredNorm();
@@ -204,8 +130,7 @@ void compare(std::uint32_t i, const Positions& positions, const Radii& radii, co
     }
     S way_sq = way_j.squaredNorm();
     // Most are too far for any of what follows: (a + b)^2 <= 2 (a^2 + b^2).
-    const S twice = S(2) * more(j);
-    const S near = radii_ij + widest + twice;
+    const S near = radii_ij + widest;
     if (r.squaredNorm() > S(2) * rounded * (near * near + way_sq)) {
       continue;
     }
@@ -214,7 +139,7 @@ void compare(std::uint32_t i, const Positions& positions, const Radii& radii, co
     }
     way_sq = squareOfSum<S>(way_sq, bendOf_sq<S>(travel, j));
     // Another course may take it anywhere within its half of the skin, which is this far at most.
-    const S far = std::max<S>(S(sqrt(way_sq)), S(free + twice));
+    const S far = std::max<S>(S(sqrt(way_sq)), free);
     const S reach = radii_ij + slack + bend + far;
     // The nearest point of the way: x + way s, 0 <= s <= 1.
     const S s = length_sq > S(0) ? std::min<S>(S(1), std::max<S>(S(0), S(way.dot(r) / length_sq))) : S(0);
@@ -230,23 +155,20 @@ void compare(std::uint32_t i, const Positions& positions, const Radii& radii, co
 
 /// Appends to `swift` the bodies that may outrun any skin, at most `most` of the n, fastest first, and leaves
 /// `swift` sorted; none that the skin [m] holds. O(N).
-/// \param ways  gets the squares of all ways [m^2] where one skin for all is not to hold them: seven in eight
-///   are less than a quarter of what others are; else empty \param mayDiffer  whether it may
-/// \return [m] the skin, made as thick as twice the way of the next one, unless ways are to be held otherwise
+/// \return [m] twice the way of the next one
 template <Real S, class Travel>
 S takeSwift(std::size_t n, std::size_t most, const S& skin, const Travel& travel,
-            std::vector<std::uint32_t>& swift, bool mayDiffer, std::vector<S>& ways) {
+            std::vector<std::uint32_t>& swift) {
   using std::sqrt;
-  ways.resize(n);
+  std::vector<S> ways(n);
   for (std::size_t i = 0; i < n; ++i) {
     ways[i] = squareOfSum<S>(wayOf<S>(travel, i).squaredNorm(), bendOf_sq<S>(travel, i));
     if (!isFinite(ways[i])) {
-      ways.clear();
-      return skin;  // the search will say which
+      return S(0);  // the search will say which
     }
   }
   if (n == 0) {
-    return skin;
+    return S(0);
   }
   std::vector<std::uint32_t> order(n);
   std::iota(order.begin(), order.end(), 0U);
@@ -263,13 +185,7 @@ S takeSwift(std::size_t n, std::size_t most, const S& skin, const Travel& travel
     }
   }
   std::sort(swift.begin(), swift.end());
-  const auto eighth = order.begin() + static_cast<std::ptrdiff_t>(std::max(most, n / 8));
-  std::nth_element(order.begin() + static_cast<std::ptrdiff_t>(most), eighth, order.end(), faster);
-  if (!mayDiffer || !(enough > skin) || !(enough * enough > S(64) * ways[*eighth])) {
-    ways.clear();
-    return thick;
-  }
-  return skin;
+  return enough;
 }
 
 /// `pairs` and `extra`, which is left sorted and without doubles, in one list, in the order of ids; without
