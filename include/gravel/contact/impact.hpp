@@ -180,11 +180,10 @@ struct ImpactHistory {
   std::uint32_t impacts = 0;  ///< and other changes of its course
   std::uint64_t partner = 0;  ///< of the last impact
   S spent = S(0);
-  S after = S(0);        ///< charged since `mostPerBody` was spent
-  S heaviest = S(0);     ///< [kg] of those that it met
-  bool free = false;     ///< let go: nothing holds it any more
-  bool changed = false;  ///< it is among the ImpactPast::changed_
-  bool ends = false;     ///< with a partner of a larger id, or a boundary, impacts of it came to an end
+  S after = S(0);     ///< charged since `mostPerBody` was spent
+  S heaviest = S(0);  ///< [kg] of those that it met
+  bool free = false;  ///< let go: nothing holds it any more
+  bool ends = false;  ///< with a partner of a larger id, or a boundary, impacts of it came to an end
 };
 
 }  // namespace detail

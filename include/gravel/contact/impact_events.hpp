@@ -24,14 +24,11 @@ namespace gravel {
 /// simultaneous contacts takes it over.
 ///
 /// Prediction is shared between threads, O(candidates + bodies x boundaries); blows follow one another in the
-/// order of (time, keys). After those of one moment that are known by then all candidates of the bodies that
-/// they struck are looked at, once each body, which may bring others at the same moment. The same bits for
-/// any number of threads.
+/// order of (time, keys), each O(candidates of its two bodies). The same bits for any number of threads.
 template <Real S>
 class ImpactEvents : private detail::ImpactCourses<S> {
   using Base = detail::ImpactCourses<S>;
   using Base::bouncesNoMore;
-  using Base::changed_;
   using Base::flightOf;
   using Base::flights_;
   using Base::give;
@@ -41,7 +38,6 @@ class ImpactEvents : private detail::ImpactCourses<S> {
   using Base::leans_;
   using Base::letGo;
   using Base::merges_;
-  using Base::predictAgain;
   using Base::predictAll;
   using Base::queue_;
   using Base::remember;
@@ -86,18 +82,11 @@ class ImpactEvents : private detail::ImpactCourses<S> {
       Base::unlink();
     }
     S now(0);
-    while (!queue_.empty() || !changed_.empty() || !struck_.empty()) {
-      const bool over = queue_.empty() || queue_.front().t > now;  // nothing else is known of this moment
-      if (over && !changed_.empty()) {
-        struck_.insert(struck_.end(), changed_.begin(), changed_.end());
-        Base::predictChanged(scene, near, now);
-        continue;
-      }
-      if (over && !struck_.empty()) {
+    while (!queue_.empty() || !struck_.empty()) {
+      if (!struck_.empty() && (queue_.empty() || queue_.front().t > now)) {
         for (const std::uint32_t i : struck_) {
           if (letGo(scene, near.pairs(), i, now, report)) {
-            Base::change(scene, i);
-            Base::predictChanged(scene, near, now);
+            Base::goOn(scene, near, {i}, now);
           }
         }
         struck_.clear();
@@ -105,18 +94,18 @@ class ImpactEvents : private detail::ImpactCourses<S> {
       }
       const Event event = queue_.pop();
       if (queue_.isVoid(event, histories_)) {
-        if (event.t == now && !changed_.empty()) {
-          predictAgain(scene, event,
-                       now);  // one of the two was struck in this moment, and not looked at since
-        }
         continue;
       }
       now = event.t;
-      if (strike(scene, event, decide, report)) {
-        Base::change(scene, event.first);
-        if (event.second != staticPartner) {
-          Base::change(scene, event.second);
-        }
+      if (!strike(scene, event, decide, report)) {
+        continue;
+      }
+      struck_.push_back(event.first);
+      if (event.second != staticPartner) {
+        struck_.push_back(event.second);
+        Base::goOn(scene, near, {event.first, event.second}, now);
+      } else {
+        Base::goOn(scene, near, {event.first}, now);
       }
     }
     Base::end();

@@ -15,6 +15,7 @@
 #include <gravel/core/memory.hpp>
 #include <gravel/core/parallel.hpp>
 
+#include <initializer_list>
 #include <optional>
 #include <vector>
 
@@ -40,7 +41,6 @@ class ImpactForecast : protected ImpactPast<S> {
   }
 
  protected:
-  using Base::changed_;
   using Base::histories_;
   using Base::isDecided;
   using Base::isHeld;
@@ -168,28 +168,19 @@ class ImpactForecast : protected ImpactPast<S> {
     }
   }
 
-  /// A body is on another course from now on. What it meets there is to be looked for.
-  template <class Scene>
-  void change(const Scene& scene, std::uint32_t i) {
-    if (isMovable(scene.bodies, i)) {
-      swept_.renew(scene, i, scene.settings.h);
-      flights_.renew(scene, i);
-    }
-    Base::noteChange(i);
-  }
-
-  /// All bodies on other courses are looked at with what they may meet.
+  /// Bodies are on other courses from `now` on, and what they meet there is looked for.
   template <class Scene, class Near>
-  void predictChanged(const Scene& scene, Near& near, const S& from) {
-    for (const std::uint32_t i : changed_) {
+  void goOn(const Scene& scene, Near& near, std::initializer_list<std::uint32_t> struck, const S& now) {
+    for (const std::uint32_t i : struck) {
       if (isMovable(scene.bodies, i)) {
-        late_.add(i, near.pairs(), pairsOf_, [&](auto& out) { near.follow(scene.bodies, i, from, out); });
+        late_.add(i, near.pairs(), pairsOf_, [&](auto& out) { near.follow(scene.bodies, i, now, out); });
+        swept_.renew(scene, i, scene.settings.h);
+        flights_.renew(scene, i);
       }
     }
-    for (const std::uint32_t i : changed_) {
-      predictAgain(scene, near.pairs(), i, from);
+    for (const std::uint32_t i : struck) {
+      predictAgain(scene, near.pairs(), i, now);
     }
-    Base::forgetChanges();
   }
 
   /// After a blow. What cannot move is on the same course as before, and meets others as was foreseen.
@@ -205,16 +196,6 @@ class ImpactForecast : protected ImpactPast<S> {
     late_.each(body, [&](const Pair& pair) { predict(scene, pair, from, Base::noPair); });
     for (std::uint32_t w = 0; w < scene.walls.size(); ++w) {
       predict(scene, body, w, from);
-    }
-  }
-
-  /// What an event that is void now has become.
-  template <class Scene>
-  void predictAgain(const Scene& scene, const Event& event, const S& from) {
-    if (event.second == staticPartner) {
-      predict(scene, event.first, event.wall, from);
-    } else {
-      predict(scene, {event.first, event.second}, from, Base::noPair);
     }
   }
 

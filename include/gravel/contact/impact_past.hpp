@@ -30,7 +30,6 @@ class ImpactPast {
   void forget() {
     histories_.forget();
     struck_.clear();
-    changed_.clear();
     islandsKnown_ = false;
     clearSpare(impacts_);
     forgetEndings();
@@ -43,7 +42,6 @@ class ImpactPast {
     giveBack(listed_);
     giveBack(anchored_);
     giveBack(struck_);
-    giveBack(changed_);
     islands_ = {};
     forgetEndings();
   }
@@ -158,19 +156,6 @@ class ImpactPast {
     return body == staticPartner || !isMovable(bodies, body) ? highest<S>() : S(bodies.masses()[body]);
   }
 
-  /// Enters a body into changed_, once.
-  void noteChange(std::uint32_t body) {
-    if (!std::exchange(histories_.at(body).changed, true)) {
-      changed_.push_back(body);
-    }
-  }
-  void forgetChanges() {
-    for (const std::uint32_t body : changed_) {
-      histories_.at(body).changed = false;
-    }
-    changed_.clear();
-  }
-
   /// Enters the last impact. \param ends  the two take no notice of each other any more in this step
   template <class Scene>
   void remember(const Scene& scene, const S& e, ImpactReport<S>& report, bool ends = false) {
@@ -234,8 +219,7 @@ class ImpactPast {
   ContactIslands islands_;               ///< of what is held
   std::vector<unsigned char> anchored_;  ///< by the body that an island is named by
   bool islandsKnown_ = false;
-  std::vector<std::uint32_t> struck_;   ///< by the blows of this moment
-  std::vector<std::uint32_t> changed_;  ///< of those: not looked at since with what they may meet
+  std::vector<std::uint32_t> struck_;  ///< by the blows of this moment
   std::vector<Impact<S>> impacts_;
   std::unordered_map<PairName, Ending, HashOfPair> endings_;  ///< of pairs that had one
   BodyPairs merges_;

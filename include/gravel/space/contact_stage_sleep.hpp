@@ -19,7 +19,9 @@ std::span<const Displacement<Scalar>> ContactStage<Scalar, Layout>::movedApart(c
 /// does not fall, and what is slow comes near only when it touches: neighbours at rest would else wake each
 /// other for ever. What is met fast, or by a boundary, is thrown on at up to twice that speed for the rest of
 /// the step, what it meets then in its turn, and a boundary goes on behind them: whom they can reach so wakes
-/// as well. (Each passes on at most the way that it had left; a row of bodies ever lighter goes further.)
+/// as well, or all where somebody may be thrown farther than two of their sizes: who is near enough would
+/// have to be sought among all with all. (Each passes on at most the way that it had left; a row of bodies
+/// ever lighter goes further.)
 template <Real Scalar, class Layout>
 template <class Visit>
 void ContactStage<Scalar, Layout>::forEachApproach(const Bodies& bodies, const Config& config,
@@ -37,6 +39,7 @@ void ContactStage<Scalar, Layout>::forEachApproach(const Bodies& bodies, const C
   }
   const Scalar slow = config.sleepSpeed * h;             // [m]
   std::vector<Scalar> thrown(bodies.size(), Scalar(0));  // [m] whichever way, within the step
+  bool far = false;                                      // farther than is sought for
   for (const Plane<Scalar>& plane : boundaries.planes()) {
     const Scalar way = h * Scalar(plane.normal.dot(plane.velocity) + detail::sizeOf<Scalar>(plane.swing()));
     for (std::size_t i = 0; way > slow && i < bodies.size(); ++i) {
@@ -44,6 +47,7 @@ void ContactStage<Scalar, Layout>::forEachApproach(const Bodies& bodies, const C
           plane.normal.dot(Vector3<Scalar>(bodies.positions()[i])) - plane.offset - bodies.radii()[i];
       if (gap < way && bodies.radii()[i] > Scalar(0) && !bodies[i].isFixed()) {
         thrown[i] = std::max<Scalar>(thrown[i], Scalar(2) * (way - std::max<Scalar>(gap, Scalar(0))));
+        far = far || thrown[i] > Scalar(4) * bodies.radii()[i];
       }
     }
   }
@@ -96,19 +100,31 @@ void ContactStage<Scalar, Layout>::forEachApproach(const Bodies& bodies, const C
     if (held && (hit || on > Scalar(0))) {
       visit(other);
     }
+    far = far || on > Scalar(2) * radii;
     const bool further = on > thrown[other];
     thrown[other] = std::max<Scalar>(thrown[other], on);
     return further;
   };
-  for (bool wider = true; wider;) {
+  for (bool wider = true; wider && !far;) {
     wider = false;
     search(bodies, config, time, way, h, profiler);
-    for (bool again = true; again; wider = wider || again) {
-      again = false;
-      for (const Pair& pair : neighbours_.pairs()) {
-        again = (!bodies[pair.second].isFixed() && meets(pair.first, pair.second)) || again;
-        again = (!bodies[pair.first].isFixed() && meets(pair.second, pair.first)) || again;
+    const std::span<const Pair> pairs = neighbours_.pairs();
+    const auto pass = [&](const Pair& pair) {
+      const bool on = !bodies[pair.second].isFixed() && meets(pair.first, pair.second);
+      const bool back = !bodies[pair.first].isFixed() && meets(pair.second, pair.first);
+      wider = wider || on || back;
+      return on || back;
+    };
+    for (bool again = true; again && !far;) {
+      again = false;  // by turns from both ends: rows are numbered one way or the other
+      for (std::size_t k = 0; k < 2 * pairs.size(); ++k) {
+        again = pass(pairs[k < pairs.size() ? k : 2 * pairs.size() - 1 - k]) || again;
       }
+    }
+  }
+  for (std::uint32_t i = 0; far && i < bodies.size(); ++i) {
+    if (!detail::isMovable(bodies, i) && !bodies[i].isFixed()) {
+      visit(i);
     }
   }
 }

@@ -66,7 +66,7 @@ void Space<Scalar, Layout>::mergeCollided(const BodyPairs& merges, const Scalar&
     }
     return id;
   };
-  const bool together = merges.size() >= manyMergers;
+  const bool together = merges.size() >= manyMergers && getG() != Scalar(0);
   const auto pull = [&] {  // [J] of all
     force_.gravity.setDomain(contact_.domain, time);
     return force_.gravity.potentialEnergy(bodies_.positions(), bodies_.masses(), getG(),
