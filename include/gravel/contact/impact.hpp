@@ -178,7 +178,7 @@ bool comesAfter(const ImpactEvent<S>& a, const ImpactEvent<S>& b) {
 template <Real S>
 struct ImpactHistory {
   std::uint32_t impacts = 0;  ///< and other changes of its course
-  std::uint64_t partner = 0;  ///< of the last impact
+  std::uint64_t partner = 0;  ///< of the last impact that it paid for
   S spent = S(0);
   S after = S(0);     ///< charged since `mostPerBody` was spent
   S heaviest = S(0);  ///< [kg] of those that it met
