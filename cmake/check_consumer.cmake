@@ -4,7 +4,7 @@
 #
 # Builds and runs tests/consumer against gravel taken in one way: find_package, pkg-config (both from an installation
 # that was moved after it was made), add_subdirectory or FetchContent. With find_package the program compiles all that
-# it uses; in the other ways it takes the code of Space<double> from SPACE, which would take half a minute each.
+# it uses; in the other ways it takes the code of Space<double> from SPACE, which would take a minute each.
 cmake_minimum_required(VERSION 3.25)
 
 file(REMOVE_RECURSE "${WORK}")

@@ -5,7 +5,7 @@
 # program: it is built and run, and must print what the next ```text block of the page shows, if one follows before
 # the next ```cpp block. Any other ```cpp block is part of a function's body, in which `config` and `space` exist;
 # those of a page are compiled together. A page without a ```cpp block fails: then nothing was checked. The code of
-# Space<double> comes from SPACE, as each page would take half a minute to compile it once more; that declaration
+# Space<double> comes from SPACE, as each page would take a minute to compile it once more; that declaration
 # stands behind the page's own code, which so has to include all that it needs.
 cmake_minimum_required(VERSION 3.25)
 
