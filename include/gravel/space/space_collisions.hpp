@@ -48,9 +48,11 @@ BodyPairs Space<Scalar, Layout>::decideTouching(const Scalar& time, const Scalar
   return std::move(outcomes.merges);
 }
 
+namespace detail {
 /// From so many mergers on, what they did to the energy of mutual gravity is found for all together: by pairs
 /// each costs O(N), which is as much for a few hundred as two sums over everybody by expansions.
 inline constexpr std::size_t manyMergers = 256;
+}  // namespace detail
 
 /// One after the other. Of two, the fixed one stays, else the heavier, else the one of the smaller id; a
 /// third that meets the one that went meets the one that stayed.
@@ -66,7 +68,7 @@ void Space<Scalar, Layout>::mergeCollided(const BodyPairs& merges, const Scalar&
     }
     return id;
   };
-  const bool together = merges.size() >= manyMergers && getG() != Scalar(0);
+  const bool together = merges.size() >= detail::manyMergers && getG() != Scalar(0);
   const auto pull = [&] {  // [J] of all
     force_.gravity.setDomain(contact_.domain, time);
     return force_.gravity.potentialEnergy(bodies_.positions(), bodies_.masses(), getG(),
