@@ -207,19 +207,17 @@ class IslandSweeps : private RowImpulses<S> {
   }
 
   template <Way way>
-  [[gnu::flatten]] void sweep() {
+  void sweep() {
     for (Island& island : islands_) {
       island.now = {};
     }
     forGroups([&](const Group& group) {
       const Pack share = Pack::of([&](std::size_t lane) { return islandOf(group.row[lane]).course.share(); });
-      Base::template relax<way>(
-          problem_, group, true, momentum_, share,
-          [&](const Pack& change_sq, const Pack& size, const Pack& along) {
-            for (std::size_t lane = 0; lane < group.count; ++lane) {
-              islandOf(group.row[lane]).now += {change_sq[lane], size[lane], along[lane]};
-            }
-          });
+      const auto [change_sq, size, along] =
+          Base::template relax<way>(problem_, group, true, momentum_, share);
+      for (std::size_t lane = 0; lane < group.count; ++lane) {
+        islandOf(group.row[lane]).now += {change_sq[lane], size[lane], along[lane]};
+      }
     });
     for (Island& island : islands_) {
       island.more = false;

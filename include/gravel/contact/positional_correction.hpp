@@ -84,10 +84,8 @@ class PositionalCorrection {
           detail::prefetch(shifts_[place.slot2]);
         };
         detail::forGroupsOf<S>(colouring, begin, end, stale, fetch, [&](const Group& group) {
-          openAll(contacts, colouring, group, settings,
-                  [&](const Pack& missing, const Pack& /*kept*/, const Pack& loss) {
-                    sum += {missing.largest(), loss.sum()};
-                  });
+          const Opening opening = openAll(contacts, colouring, group, settings);
+          sum += {opening.missing.largest(), opening.loss.sum()};
         });
       };
       // Lone contacts are right after one sweep.
@@ -162,9 +160,8 @@ class PositionalCorrection {
 
   /// Opens the contacts of small islands.
   template <class B>
-  [[gnu::flatten]] Opened openBundle(std::span<const Contact<S>> contacts, const ContactColoring& colouring,
-                                     std::size_t bundle, const B& bodies,
-                                     const CorrectionSettings<S>& settings) {
+  Opened openBundle(std::span<const Contact<S>> contacts, const ContactColoring& colouring,
+                    std::size_t bundle, const B& bodies, const CorrectionSettings<S>& settings) {
     const std::uint32_t first = colouring.islands().firstOf(bundle);
     std::vector<Island> islands(colouring.islands().firstOf(bundle + 1) - first);
     const auto islandOf = [&](std::size_t k) -> Island& { return islands[colouring.islandOf(k) - first]; };
@@ -203,13 +200,11 @@ class PositionalCorrection {
           return !island.ended && watch_.isStale(k, place.slot1, place.slot2, S(island.course.enough / S(2)));
         };
         detail::forGroupsOf<S>(colouring, colour.begin, colour.end, stale, [&](const Group& group) {
-          openAll(contacts, colouring, group, settings,
-                  [&](const Pack& missing, const Pack& kept, const Pack& loss) {
-                    leaps.take(group, missing, kept);
-                    for (std::size_t lane = 0; lane < group.count; ++lane) {
-                      islandOf(group.row[lane]).now += {missing[lane], loss[lane]};
-                    }
-                  });
+          const auto [missing, kept, loss] = openAll(contacts, colouring, group, settings);
+          leaps.take(group, missing, kept);
+          for (std::size_t lane = 0; lane < group.count; ++lane) {
+            islandOf(group.row[lane]).now += {missing[lane], loss[lane]};
+          }
         });
       }
       for (Island& island : islands) {
@@ -277,10 +272,15 @@ class PositionalCorrection {
     });
   }
 
-  /// Opens these rows. \param tell  called with what was missing and is kept [m], and lost [J]
-  template <class Tell>
-  [[gnu::flatten]] void openAll(std::span<const Contact<S>> contacts, const ContactColoring& colouring,
-                                const Group& group, const CorrectionSettings<S>& settings, Tell&& tell) {
+  /// By lane, what was missing and is kept [m], and what was lost [J].
+  struct Opening {
+    Pack missing, kept, loss;
+  };
+
+  /// Opens these rows.
+  [[gnu::flatten, gnu::noinline]] Opening openAll(std::span<const Contact<S>> contacts,
+                                                  const ContactColoring& colouring, const Group& group,
+                                                  const CorrectionSettings<S>& settings) {
     const Pack zero = Pack::zero();
     const auto contact = detail::OverlapLanes<S>::load(contacts, colouring.rows(), group);
     Bodies b1 = Bodies::load(shifts_, group.slot1);
@@ -305,7 +305,7 @@ class PositionalCorrection {
       move(group.slot2[lane], opened.way2[lane]);
       watch_.enter(group.row[lane], group.slot1[lane], group.slot2[lane]);
     }
-    tell(opened.missing, kept, opened.loss);
+    return {opened.missing, kept, opened.loss};
   }
 
   std::vector<Body> shifts_;  ///< by slot; the last one is the boundary

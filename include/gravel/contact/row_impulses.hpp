@@ -23,12 +23,18 @@ struct RowImpulses {
   /// last step, by a share of it.
   enum class Way { Bare, Watched, Coasting };
 
-  /// First on along the last step, then to where these contacts are right.
+  /// By lane, what SweepProgress sums up.
+  struct Relaxed {
+    Pack change_sq, size, along;
+  };
+
+  /// First on along the last step, then to where these contacts are right. The largest function of all: it is
+  /// there once for each way.
   /// \param all  impulses of all rows are those of this problem
-  /// \param share by lane, of the last step \param tell  called with SweepProgress::change_sq, size and along
-  template <Way way, class Tell>
-  [[gnu::always_inline]] static inline void relax(ContactProblem<S>& problem, const Group& group, bool all,
-                                                  Momentum& momentum, const Pack& share, Tell&& tell) {
+  /// \param share by lane, of the last step
+  template <Way way>
+  [[gnu::flatten, gnu::noinline]] static Relaxed relax(ContactProblem<S>& problem, const Group& group,
+                                                       bool all, Momentum& momentum, const Pack& share) {
     Lanes row = problem.load(group, all);
     auto b1 = BodyLanes<S>::load(problem.bodies, group.slot1);
     auto b2 = BodyLanes<S>::load(problem.bodies, group.slot2);
@@ -59,11 +65,10 @@ struct RowImpulses {
     const Pack change_sq = largerOf(changes.change_sq(), turned.d_rho.squaredNorm());
     const Pack size =
         changes.dj * changes.approach + changes.dt.dot(changes.du) + turned.dl.dot(turned.d_rho);
+    Pack along = Pack::zero();
     if constexpr (way == Way::Coasting) {
-      tell(change_sq, size, last.n * changes.approach + last.t.dot(changes.du) + last.l.dot(turned.d_rho));
+      along = last.n * changes.approach + last.t.dot(changes.du) + last.l.dot(turned.d_rho);
       momentum.store(group, step + typename Momentum::Step{changes.dj, changes.dt, turned.dl});
-    } else {
-      tell(change_sq, size, Pack::zero());
     }
     if constexpr (way == Way::Watched) {
       const Pack push_t = changes.dt.sumAbs();  // |its part across n|, or more
@@ -76,6 +81,7 @@ struct RowImpulses {
         problem.watch.enter(group.row[lane], group.slot1[lane], group.slot2[lane]);
       }
     }
+    return {change_sq, size, along};
   }
 
   /// Takes down which rows are at the limit of friction now. \param atOnce  that is to slide

@@ -189,18 +189,17 @@ class SequentialImpulses : private detail::RowImpulses<S> {
   }
 
   template <Way way>
-  [[gnu::flatten]] void relax(ContactProblem<S>& problem, const Group& group, const S& share, Progress& sum) {
-    Base::template relax<way>(problem, group, !problem.passes, momentum_, Pack::all(share),
-                              [&](const Pack& change_sq, const Pack& size, const Pack& along) {
-                                Progress progress{change_sq.largest(), size.sum(), along.sum()};
-                                if constexpr (way == Way::Watched) {
-                                  const S still_sq = problem.watch.still() * problem.watch.still();
-                                  for (std::size_t lane = 0; lane < group.count; ++lane) {
-                                    progress.changed += change_sq[lane] > still_sq ? 1U : 0U;
-                                  }
-                                }
-                                sum += progress;
-                              });
+  void relax(ContactProblem<S>& problem, const Group& group, const S& share, Progress& sum) {
+    const auto [change_sq, size, along] =
+        Base::template relax<way>(problem, group, !problem.passes, momentum_, Pack::all(share));
+    Progress progress{change_sq.largest(), size.sum(), along.sum()};
+    if constexpr (way == Way::Watched) {
+      const S still_sq = problem.watch.still() * problem.watch.still();
+      for (std::size_t lane = 0; lane < group.count; ++lane) {
+        progress.changed += change_sq[lane] > still_sq ? 1U : 0U;
+      }
+    }
+    sum += progress;
   }
 
   detail::SweepMomentum<S> momentum_;
