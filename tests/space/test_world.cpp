@@ -405,6 +405,31 @@ TEST_CASE("A force of the hook that is not finite is refused with its body") {
   }
 }
 
+// The pass over all bodies goes to its end first, in more than one thread where there are some.
+TEST_CASE(
+    "Of several wrong forces of a hook the first body's is named, and all have their own motion again") {
+  const double dt = 1e-2;
+  Space<double> space(quiet(dt));
+  space.setUniformField({0, 0, -9.8});
+  for (int i = 0; i < 6000; ++i) {
+    space.addBody(at({2.5 * i, 0, 0}, {0, 0, 0}));
+  }
+  double shown = 0;
+  space.setForceHook([&](auto& bodies, double time) {
+    if (time > 0) {
+      shown = bodies[4321].velocity()[2];
+      bodies[4900].force()[0] = std::numeric_limits<double>::infinity();
+      bodies[777].torque()[1] = std::numeric_limits<double>::quiet_NaN();
+      bodies[5999].force()[2] = std::numeric_limits<double>::quiet_NaN();
+    }
+  });
+  CHECK_THROWS_WITH(space.computeDynamics(0), ContainsSubstring("torque of the hook on body 777"));
+  CHECK_THAT(shown, WithinRel(-9.8 * dt, 1e-12));
+  for (std::size_t i = 0; i < space.n(); ++i) {
+    REQUIRE_THAT(space.body(i).velocity()[2], WithinRel(-9.8 * dt / 2, 1e-12));
+  }
+}
+
 TEST_CASE("An exception of the hook comes out of the step") {
   Space<double> space(quiet(1e-3));
   space.addBody(at({0, 0, 0}, {1, 0, 0}));

@@ -51,8 +51,7 @@ class ContactSolver {
   void begin(const ContactView<S>& contacts, const B& bodies, const ContactFacts<S>& facts) {
     contacts_ = contacts;
     facts_ = facts;
-    const bool solved = goesOn_ && inRows_ && problem_.rows.size() == names_.size();
-    goesOn_ = false;
+    const bool solved = std::exchange(goesOn_, false) && inRows_ && problem_.rows.size() == names_.size();
     if (!std::exchange(fresh_, true) || names_.empty()) {  // else nothing was solved since they ended
       detail::clearSpare(ended_);
     }
@@ -86,8 +85,7 @@ class ContactSolver {
     detail::require("step of a contact solve", dt, detail::nonNegative<S>());
     const ContactView<S>& contacts = contacts_;
     ContactReport<S> report;
-    const bool goesOn = goesOn_;
-    goesOn_ = false;
+    const bool goesOn = std::exchange(goesOn_, false);
     listed_ = false;
     sameNames_ = !handedOn_;
     // What was handed on gives way to what is solved, row by row.
@@ -188,6 +186,8 @@ class ContactSolver {
         });
   }
   const ContactColoring& coloring() const { return coloring_; }
+  /// Whether restitution acted in row r of the last solve().
+  bool isBlow(std::size_t r) const { return rowImpulses_.isImpact(r); }
   /// What the last solve() did to the velocity of a body [m s^-1], and to its spin [rad/s].
   Vector3<S> changeOf(std::uint32_t body) const {
     return goesOn_ ? problem_.changeOf(coloring_.slotOf(body)) : Vector3<S>(Vector3<S>::Zero());

@@ -51,6 +51,7 @@ class ImpulseList {
     return turning_.empty() ? Vector3<S>(Vector3<S>::Zero()) : turning_[k].l;
   }
 
+  bool isImpact(std::size_t k) const { return impacts_[k] != 0; }
   ContactImpulse<S> get(std::size_t k) const {
     return {pushes_[k].normal, pushes_[k].tangential, turning(k), impacts_[k] != 0};
   }

@@ -243,11 +243,11 @@ T orderedSum(std::size_t n, std::size_t chunk, const T& zero, F&& f) {
 }
 
 /// The least of `start` and f(i) for i = 0 … n-1, in chunks.
-template <class T, class F>
+template <Share share = Share::AsFree, class T, class F>
 T orderedMin(std::size_t n, std::size_t chunk, const T& start, F&& f) {
   const detail::Chunks chunks(n, chunk);
   std::vector<T> parts(chunks.count(), start);
-  parallelForTasks(parts.size(), [&](std::size_t c) {
+  parallelForTasks<share>(parts.size(), [&](std::size_t c) {
     for (std::size_t i = chunks.begin(c); i < chunks.end(c); ++i) {
       const T x = f(i);
       if (x < parts[c]) {

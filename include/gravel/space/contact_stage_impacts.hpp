@@ -214,20 +214,22 @@ template <Real Scalar, class Layout>
 void ContactStage<Scalar, Layout>::tellChanges(const Bodies& bodies, const Scalar& kick,
                                                ContactKicks<Scalar>& kicks) const {
   const Vector3<Scalar> zero = Vector3<Scalar>::Zero();
-  kicks.velocities.assign(bodies.size(), zero);
-  kicks.spins.assign(bodies.size(), zero);
-  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
-    if (solver_.knows(i)) {
-      kicks.velocities[i] = solver_.changeOf(i);
-      kicks.spins[i] = solver_.turnOf(i);
-    }
-  }
+  kicks.velocities.resize(bodies.size());
+  kicks.spins.resize(bodies.size());
+  parallelFor(bodies.size(), detail::bodyGrain, [&](std::size_t i) {
+    const auto body = static_cast<std::uint32_t>(i);
+    const bool touches = solver_.knows(body);
+    kicks.velocities[i] = touches ? solver_.changeOf(body) : zero;
+    kicks.spins[i] = touches ? solver_.turnOf(body) : zero;
+  });
   // A blow is not dealt once more: of these bodies the present velocities are shown.
-  const std::vector<ContactImpulse<Scalar>> impulses = solver_.copyImpulses();
-  for (std::size_t k = 0; k < impulses.size() && acted_; ++k) {
-    const Contact<Scalar>& contact = contacts_[k];
-    for (const std::uint32_t i : {contact.first, contact.second}) {
-      if (impulses[k].impact && i != staticPartner && detail::isMovable(bodies, i)) {
+  const auto& rows = solver_.coloring().rows();
+  for (std::size_t r = 0; acted_ && r < rows.size(); ++r) {
+    if (!solver_.isBlow(r)) {
+      continue;
+    }
+    for (const std::uint32_t i : {contacts_[rows[r].contact].first, contacts_[rows[r].contact].second}) {
+      if (i != staticPartner && detail::isMovable(bodies, i)) {
         kicks.velocities[i] = -kick * Vector3<Scalar>(bodies.accelerations()[i]);
         kicks.spins[i] = -kick * Vector3<Scalar>(bodies.angularAccelerations()[i]);
       }

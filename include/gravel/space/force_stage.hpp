@@ -81,10 +81,12 @@ class ForceStage {
                 const Domain<Scalar>& domain, const Scalar& time, Profiler& profiler,
                 const Behind<Scalar>& behind = {}) {
     const std::size_t n = bodies.size();
-    now_.clear();
-    ahead_.clear();
-    if (hook && behind.any()) {
+    ahead_ = hook && behind.any();
+    if (ahead_) {
       bringUp(bodies, behind);
+    }
+    if (hook) {
+      hookForces_.resize(n);
     }
     const char* reason = reasonToSkip(bodies, G);
     if (reason == nullptr) {
@@ -99,6 +101,9 @@ class ForceStage {
       detail::forTilesOrBodies(
           bodies.storage(), begin, end, [&](std::size_t i) { finishTile(bodies, i, reason == nullptr); },
           [&](std::size_t i) { finishOne(bodies, i, reason == nullptr); });
+      for (std::size_t i = begin; hook && i < end; ++i) {
+        readyForHook(bodies, i);
+      }
     });
     if (hook) {
       addHook(bodies, time);
@@ -203,42 +208,48 @@ class ForceStage {
   };
 
   void bringUp(const Bodies<Scalar, Layout>& bodies, const Behind<Scalar>& behind) {
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      const auto body = bodies[i];
-      now_.push_back({body.velocity(), body.angularVelocity()});
-    }
-    ahead_ = now_;
+    others_.resize(bodies.size());
     const bool touches = contactKicks.velocities.size() == bodies.size();
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      if (!bodies[i].isHeld()) {
-        ahead_[i].v += behind.velocities * Vector3<Scalar>(bodies[i].acceleration());
-        ahead_[i].w += behind.spins * Vector3<Scalar>(bodies[i].angularAcceleration());
+    parallelFor(bodies.size(), detail::bodyGrain, [&](std::size_t i) {
+      const auto body = bodies[i];
+      Vector3<Scalar> v = body.velocity();
+      Vector3<Scalar> w = body.angularVelocity();
+      if (!body.isHeld()) {
+        v += behind.velocities * Vector3<Scalar>(body.acceleration());
+        w += behind.spins * Vector3<Scalar>(body.angularAcceleration());
         if (!behind.kicks.empty()) {
-          ahead_[i].v += behind.kicks[i];
+          v += behind.kicks[i];
         }
         if (touches) {
-          ahead_[i].v += contactKicks.velocities[i];
-          ahead_[i].w += contactKicks.spins[i];
+          v += contactKicks.velocities[i];
+          w += contactKicks.spins[i];
         }
       }
-    }
+      others_[i] = {v, w};
+    });
     contactKicks.clear();
   }
-  static void show(Bodies<Scalar, Layout>& bodies, const std::vector<Motion>& motions) {
-    for (std::size_t i = 0; i < motions.size(); ++i) {
-      bodies[i].velocity() = motions[i].v;
-      bodies[i].angularVelocity() = motions[i].w;
+
+  /// Body i as the hook is to see it.
+  void readyForHook(Bodies<Scalar, Layout>& bodies, std::size_t i) {
+    const auto body = bodies[i];
+    hookForces_[i] = body.force();
+    body.torque() = Vector3<Scalar>::Zero().eval();
+    if (ahead_) {
+      const Motion now{body.velocity(), body.angularVelocity()};
+      show(bodies, i);
+      others_[i] = now;
+    }
+  }
+  void show(Bodies<Scalar, Layout>& bodies, std::size_t i) const {
+    if (ahead_) {
+      bodies[i].velocity() = others_[i].v;
+      bodies[i].angularVelocity() = others_[i].w;
     }
   }
 
   void addHook(Bodies<Scalar, Layout>& bodies, const Scalar& time) {
     const std::size_t n = bodies.size();
-    hookForces_.resize(n);
-    for (std::size_t i = 0; i < n; ++i) {
-      hookForces_[i] = bodies[i].force();
-      bodies[i].torque() = Vector3<Scalar>::Zero().eval();
-    }
-    show(bodies, ahead_);
     try {
       hook(bodies, time);
       if (bodies.size() != n) {
@@ -248,31 +259,41 @@ class ForceStage {
       }
     } catch (...) {
       if (bodies.size() == n) {
-        show(bodies, now_);
+        parallelFor(n, detail::bodyGrain, [&](std::size_t i) { show(bodies, i); });
       }
       throw;
     }
-    show(bodies, now_);
-    for (std::size_t i = 0; i < n; ++i) {
-      const auto body = bodies[i];
-      hookForces_[i] = Vector3<Scalar>(body.force()) - hookForces_[i];
-      if (!isFinite(hookForces_[i]) || !isFinite(Vector3<Scalar>(body.torque()))) {
-        const bool ofForce = !isFinite(hookForces_[i]);
-        detail::refuse((ofForce ? "force of the hook on body " : "torque of the hook on body ") +
-                           std::to_string(toInteger(body.id())),
-                       detail::formatVector(ofForce ? hookForces_[i] : Vector3<Scalar>(body.torque())),
-                       "finite");
-      }
-      if (!body.isFixed()) {
-        body.acceleration() += body.accelerationBy(hookForces_[i]);
-        body.angularAcceleration() = body.angularAccelerationBy(body.torque());
-      }
+    const std::size_t wrong = orderedMin<Share::Alike>(
+        n, detail::bodyGrain, n, [&](std::size_t i) { return take(bodies, i) ? n : i; });
+    if (wrong < n) {
+      const Vector3<Scalar> torque = bodies[wrong].torque();
+      const bool ofForce = !isFinite(hookForces_[wrong]);
+      detail::refuse((ofForce ? "force of the hook on body " : "torque of the hook on body ") +
+                         std::to_string(toInteger(bodies[wrong].id())),
+                     detail::formatVector(ofForce ? hookForces_[wrong] : torque), "finite");
     }
   }
 
+  /// What the hook gave to body i, which moves as before again; false if it is not finite.
+  bool take(Bodies<Scalar, Layout>& bodies, std::size_t i) {
+    show(bodies, i);
+    const auto body = bodies[i];
+    const Vector3<Scalar> torque = body.torque();
+    hookForces_[i] = Vector3<Scalar>(body.force()) - hookForces_[i];
+    if (!isFinite(hookForces_[i]) || !isFinite(torque)) {
+      return false;
+    }
+    if (!body.isFixed()) {
+      body.acceleration() += body.accelerationBy(hookForces_[i]);
+      const bool none = detail::equalIsSame<Scalar> && torque == Vector3<Scalar>::Zero();
+      body.angularAcceleration() = none ? torque : body.angularAccelerationBy(torque);
+    }
+    return true;
+  }
+
   std::vector<Vector3<Scalar>> hookForces_;
-  std::vector<Motion> now_;    // of all bodies, while the hook sees others
-  std::vector<Motion> ahead_;  // what it sees
+  bool ahead_ = false;          // the hook sees other motions than those of this moment
+  std::vector<Motion> others_;  // these; while it sees them, those of this moment
 };
 
 }  // namespace gravel

@@ -36,20 +36,30 @@ class HookWork {
   /// \param free  bodies drift straight ahead, once
   void begin(const Bodies& bodies, Forces forces, bool free) {
     const std::size_t n = bodies.size();
-    forces_.assign(forces.begin(), forces.end());
-    torques_.resize(n);
-    parallelFor(n, detail::bodyGrain, [&](std::size_t i) { torques_[i] = bodies[i].torque(); });
-    ways_.assign(n, Vector3<Scalar>::Zero());
-    places_.resize(n);
-    middles_.resize(n);
-    power_ = powerOf(bodies, forces_, torques_);
+    for (auto* const column : {&forces_, &ways_, &places_, &middles_}) {
+      column->resize(n);
+    }
+    turns_ = orderedSum(n, detail::bodyGrain, std::size_t{0}, [&](std::size_t begin, std::size_t end) {
+               std::size_t turning = 0;
+               for (std::size_t i = begin; i < end; ++i) {
+                 const auto body = bodies[i];
+                 forces_[i] = of(forces, i);
+                 places_[i] = body.position();
+                 turning += isNone(body.torque()) ? 0U : 1U;
+               }
+               return turning;
+             }) > 0;
+    torques_.resize(turns_ ? n : 0);
+    parallelFor(torques_.size(), detail::bodyGrain, [&](std::size_t i) { torques_[i] = bodies[i].torque(); });
     done_ = Sums::Zero();
     crossed_ = Scalar(0);
     time_ = Scalar(0);
+    departed_ = false;
     byWay_ = free;
+    power_ = needsPower() ? powerOf(bodies) : Sums(Sums::Zero());
   }
 
-  /// Before what moves bodies.
+  /// Before what moves bodies, but for the first time after begin().
   void depart(const Bodies& bodies) {
     parallelFor(bodies.size(), detail::bodyGrain, [&](std::size_t i) { places_[i] = bodies[i].position(); });
   }
@@ -57,9 +67,11 @@ class HookWork {
   void arrive(const Bodies& bodies, const Scalar& time) {
     late_ = time_ / Scalar(2);
     parallelFor(bodies.size(), detail::bodyGrain, [&](std::size_t i) {
-      ways_[i] += Vector3<Scalar>(bodies[i].position()) - places_[i];
+      const Vector3<Scalar> way = Vector3<Scalar>(bodies[i].position()) - places_[i];
+      ways_[i] = departed_ ? Vector3<Scalar>(ways_[i] + way) : way;
       middles_[i] = middleOf(bodies, i);
     });
+    departed_ = true;
     time_ += time;
   }
   /// Velocities jumped where bodies crossed the edge of a sheared domain, before the last kick of a part of
@@ -68,46 +80,48 @@ class HookWork {
     crossed_ += sumOver(bodies, Scalar(0), [&](std::size_t i) {
       const Vector3<Scalar> jump = middleOf(bodies, i) - middles_[i];
       middles_[i] += jump;
-      return bodies[i].inverseMass() > Scalar(0) ? Scalar(of(forces_, i).dot(jump) * (time / Scalar(2)))
+      return bodies[i].inverseMass() > Scalar(0) ? Scalar(forces_[i].dot(jump) * (time / Scalar(2)))
                                                  : Scalar(0);
     });
   }
   /// Blows of a drift of `time` [s] that is to come changed spins.
   void turn(std::span<const TurnChange<Scalar>> turns, const Scalar& time) {
     for (const TurnChange<Scalar>& turn : turns) {
-      done_[1] +=
-          torques_[turn.body].dot(Vector3<Scalar>(turn.after - turn.before)) * (time / Scalar(2) - turn.time);
+      done_[1] += of(torques_, turn.body).dot(Vector3<Scalar>(turn.after - turn.before)) *
+                  (time / Scalar(2) - turn.time);
     }
   }
   /// A part of `time` [s] is over.
   void endPart(const Bodies& bodies, const Scalar& time) {
-    const Sums power = powerOf(bodies, forces_, torques_);
-    done_ += (power_ + power) * (time / Scalar(2));
-    power_ = power;
+    if (needsPower()) {
+      const Sums power = powerOf(bodies);
+      done_ += (power_ + power) * (time / Scalar(2));
+      power_ = power;
+    }
   }
   /// Something touches: velocities have jumped.
   void bend() { byWay_ = true; }
 
   /// [m s^-2] by which a force that is now `forces` differs from what it was.
   Vector3<Scalar> changeOf(const Bodies& bodies, Forces forces, std::size_t i) const {
-    return bodies[i].accelerationBy(of(forces, i) - of(forces_, i));
+    return bodies[i].accelerationBy(of(forces, i) - forces_[i]);
   }
 
   /// [J] since the last begin(), after the last endPart(). \param forces [N] at the end
   Scalar end(const Bodies& bodies, Forces forces) {
-    parallelFor(bodies.size(), detail::bodyGrain, [&](std::size_t i) { torques_[i] = bodies[i].torque(); });
     const Scalar half = time_ / Scalar(2);
-    const Sums change = (powerOf(bodies, forces, torques_) - power_) * half;
-    Scalar pushed = done_[0] + change[0];
-    if (byWay_) {
-      pushed = crossed_ + sumOver(bodies, Scalar(0), [&](std::size_t i) {
-                 const Vector3<Scalar> F_0 = of(forces_, i);
-                 const Vector3<Scalar> dF = of(forces, i) - F_0;
-                 return bodies[i].inverseMass() > Scalar(0)
-                            ? Scalar(F_0.dot(ways_[i]) + dF.dot(middles_[i]) * half)
-                            : Scalar(0);
-               });
-    }
+    const Sums sums = sumOver(bodies, Sums(Sums::Zero()), [&](std::size_t i) {
+      const auto body = bodies[i];
+      const Vector3<Scalar> F_1 = of(forces, i);
+      const Scalar turning = turningPower(body, body.torque());
+      if (!byWay_) {
+        return Sums(pushingPower(body, F_1), turning);
+      }
+      const Scalar work = forces_[i].dot(ways_[i]) + (F_1 - forces_[i]).dot(middles_[i]) * half;
+      return Sums(body.inverseMass() > Scalar(0) ? work : Scalar(0), turning);
+    });
+    const Sums change = (sums - power_) * half;
+    const Scalar pushed = byWay_ ? Scalar(crossed_ + sums[0]) : Scalar(done_[0] + change[0]);
     return pushed + done_[1] + change[1];
   }
 
@@ -137,19 +151,32 @@ class HookWork {
     });
   }
 
-  /// Of forces and of torques at the present velocities and spins [W].
-  static Sums powerOf(const Bodies& bodies, Forces forces, Forces torques) {
+  static bool isNone(const Vector3<Scalar>& vector) {
+    return detail::equalIsSame<Scalar> && vector == Vector3<Scalar>::Zero();
+  }
+  /// Whether anything will be made of the power at the start: not where the way counts and nothing turns.
+  bool needsPower() const { return !byWay_ || turns_; }
+
+  /// Of a force and of a torque at the present velocity and spin of a body [W].
+  template <class Body>
+  static Scalar pushingPower(const Body& body, const Vector3<Scalar>& force) {
+    return body.inverseMass() > Scalar(0) ? Scalar(force.dot(Vector3<Scalar>(body.velocity()))) : Scalar(0);
+  }
+  template <class Body>
+  static Scalar turningPower(const Body& body, const Vector3<Scalar>& torque) {
+    return !isNone(torque) && body.isTurnable() ? Scalar(torque.dot(Vector3<Scalar>(body.angularVelocity())))
+                                                : Scalar(0);
+  }
+  /// Of all forces and torques of the start.
+  Sums powerOf(const Bodies& bodies) const {
     return sumOver(bodies, Sums(Sums::Zero()), [&](std::size_t i) {
       const auto body = bodies[i];
-      const auto product = [](bool moves, const Vector3<Scalar>& force, const Vector3<Scalar>& velocity) {
-        return moves ? Scalar(force.dot(velocity)) : Scalar(0);
-      };
-      return Sums(product(body.inverseMass() > Scalar(0), of(forces, i), body.velocity()),
-                  product(body.isTurnable(), of(torques, i), body.angularVelocity()));
+      return Sums(pushingPower(body, forces_[i]), turningPower(body, of(torques_, i)));
     });
   }
 
-  std::vector<Vector3<Scalar>> forces_, torques_, ways_, places_;  ///< by body; [N], [N m] at the start
+  std::vector<Vector3<Scalar>> forces_, ways_, places_;  ///< by body; [N] at the start
+  std::vector<Vector3<Scalar>> torques_;                 ///< [N m] at the start, if any `turns_`
   std::vector<Vector3<Scalar>> middles_;  ///< [m s^-1] of the step's middle, as the last drift leaves it
   Sums power_ = Sums::Zero();             ///< [W] at the start of the part
   Sums done_ = Sums::Zero();              ///< [J] until then
@@ -157,6 +184,8 @@ class HookWork {
   Scalar time_ = Scalar(0);               ///< [s] since the start
   Scalar late_ = Scalar(0);               ///< [s] by which the last drift was later than the step's middle
   bool byWay_ = true;
+  bool turns_ = false;     ///< some torque was not 0 at the start
+  bool departed_ = false;  ///< since the start
 };
 
 }  // namespace gravel

@@ -173,8 +173,9 @@ void Space<Scalar, Layout>::advance(const Scalar& h, std::size_t part, std::size
   if (works) {
     if (part == 0 || apart) {
       force_.hookWork.begin(bodies_, force_.hookForces(), driftsFreely);
+    } else {
+      force_.hookWork.depart(bodies_);
     }
-    force_.hookWork.depart(bodies_);
   }
   const auto bendWay = [&] {
     if (works && (!contacts().empty() || contact_.struck())) {
