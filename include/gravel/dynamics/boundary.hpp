@@ -30,21 +30,30 @@ struct Plane {
   /// it along, as a conveyor belt does.
   Vector3<Scalar> velocity = Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(0));
   Vector3<Scalar> velocityBefore = Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(0));  ///< in the last step
-  std::size_t number = 0;           ///< its own among the boundaries of a space, never given twice
-  Scalar changeBefore = Scalar(0);  ///< [m s^-1] along n, of the velocity in the last step
+  std::size_t number = 0;  ///< its own among the boundaries of a space, never given twice
+  /// [m s^-1] along n, by which the velocity grew through the last step: its acceleration then, times that
+  /// step.
+  Scalar changeBefore = Scalar(0);
+  Scalar pace = Scalar(1);  ///< length of this step over that of the last one
 
   /// Whether it moves in this step as it did at the last one's end.
   bool isSteady() const { return velocity == velocityBefore && changeBefore == Scalar(0); }
 
-  /// [m s^-1] along n, by which the velocity grows from the middle of the step to its end: half of what
-  /// changes from step to step, but no more than in the step before, and none against it. So what goes on is
-  /// followed, and one sudden change is a blow at the step's start. (A limiter of slopes: van Leer 1977, J.
-  /// Comput. Phys. 23, 276.)
+  /// [m s^-1] along n, by which the velocity V grows from the middle of the step to its end if the change
+  /// from the middle of the last one goes on evenly: (V - V_before) h/(h + h_before), half of it in steps
+  /// that are alike.
+  Scalar evenSwing() const {
+    return normal.dot(Vector3<Scalar>(velocity - velocityBefore)) * (pace / (Scalar(1) + pace));
+  }
+
+  /// The same, but by no more than twice the acceleration of the step before gives, and none against it. So
+  /// what goes on is followed, and one sudden change is a blow at the step's start. (A limiter of slopes: van
+  /// Leer 1977, J. Comput. Phys. 23, 276.)
   Scalar swing() const {
-    const Scalar half = normal.dot(Vector3<Scalar>(velocity - velocityBefore)) / Scalar(2);
-    const Scalar least = std::min<Scalar>(Scalar(0), changeBefore);
-    const Scalar most = std::max<Scalar>(Scalar(0), changeBefore);
-    return std::min<Scalar>(std::max<Scalar>(half, least), most);
+    const Scalar limit = changeBefore * pace;
+    const Scalar least = std::min<Scalar>(Scalar(0), limit);
+    const Scalar most = std::max<Scalar>(Scalar(0), limit);
+    return std::min<Scalar>(std::max<Scalar>(evenSwing(), least), most);
   }
 
   /// [m s^-1] when a share (0 to 1) of the step has passed. Across n it changes evenly to `velocity`:
@@ -160,6 +169,13 @@ class Boundaries {
     }
   }
 
+  /// A step of h [s] begins, after one of `before`, 0 if there was none.
+  void beginStep(const Scalar& h, const Scalar& before) {
+    for (Plane<Scalar>& plane : planes_) {
+      plane.pace = before > Scalar(0) ? Scalar(h / before) : Scalar(1);
+    }
+  }
+
   /// Moves every plane by its velocity over h [s], in the middle of which a share of the step has passed.
   void advance(const Scalar& h, const Scalar& share = Scalar(0.5)) {
     for (Plane<Scalar>& plane : planes_) {
@@ -171,8 +187,9 @@ class Boundaries {
   /// A step is over, in which all have come to their velocities.
   void endStep() {
     for (Plane<Scalar>& plane : planes_) {
-      plane.changeBefore = plane.normal.dot(Vector3<Scalar>(plane.velocity - plane.velocityBefore));
+      plane.changeBefore = Scalar(2) * plane.evenSwing();
       plane.velocityBefore = plane.velocity;
+      plane.pace = Scalar(1);
     }
     firstNew_ = next_;
   }

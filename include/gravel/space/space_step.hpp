@@ -87,8 +87,9 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration, const Sc
   }
   Profiler::Step timing(profiler_);
   std::size_t more = 0;
-  previous_dt_ = h;
   contact_.beginStep();
+  contact_.boundaries.beginStep(h, previous_dt_);
+  previous_dt_ = h;
   if (!bodies_.empty()) {
     ledgerOpen_ = true;
     parts_ = chooseParts(h);
