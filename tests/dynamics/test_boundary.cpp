@@ -81,6 +81,8 @@ TEST_CASE("Planes keep their numbers, which are never given twice") {
   CHECK(boundaries.planes().size() == 2);
   CHECK(boundaries.at(2).number == 2);
   CHECK_THROWS_AS(boundaries.at(1), std::out_of_range);
+  CHECK(boundaries.find(2) == 1);
+  CHECK(boundaries.find(1) == 2);  // none
   CHECK_THROWS_WITH(boundaries.remove(1), ContainsSubstring("no plane has the number 1"));
   CHECK_THROWS_AS(boundaries.setVelocity(7, {0, 0, 1}), std::out_of_range);
   CHECK_THROWS_WITH(boundaries.setVelocity(2, {0, std::numeric_limits<double>::infinity(), 1}),

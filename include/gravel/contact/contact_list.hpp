@@ -5,11 +5,12 @@
 
 #include <gravel/contact/contact.hpp>
 
-#include <array>
+#include <algorithm>
 #include <cstdint>
-#include <limits>
+#include <map>
 #include <span>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace gravel {
@@ -24,6 +25,13 @@ struct ContactSurface {
   Scalar driftChange = Scalar(0);  ///< [m s^-1] of the drift along the normal in a step: it does not bounce
 
   friend bool operator==(const ContactSurface&, const ContactSurface&) = default;
+};
+
+/// How a boundary moves, for what touches it.
+template <Real Scalar>
+struct SurfaceDrift {
+  Vector3<Scalar> velocity;   ///< `ContactSurface::drift`
+  Scalar change = Scalar(0);  ///< `ContactSurface::driftChange`
 };
 
 /// Contacts and their surfaces, seen. Owns nothing.
@@ -65,7 +73,7 @@ struct ContactList {
   const Material<Scalar>& material(const Contact<Scalar>& c) const { return surface(c).material; }
   const Vector3<Scalar>& drift(const Contact<Scalar>& c) const { return surface(c).drift; }
 
-  /// Of this contact alone. O(1): a surface that nobody has any more stays until setDrift() or clear().
+  /// Of this contact alone. O(1): a surface that nobody has any more stays until setDrifts() or clear().
   void setSurface(Contact<Scalar>& c, const ContactSurface<Scalar>& surface) {
     if (surfaces.empty() || !detail::equalIsSame<Scalar> || !(surfaces.back() == surface)) {
       surfaces.push_back(surface);
@@ -81,28 +89,36 @@ struct ContactList {
     surfaces.clear();
   }
 
-  /// Another drift, with its change, for the contacts c that which(c) tells; those that shared a surface
-  /// share the new one, and surfaces that no contact has are forgotten. O(contacts + surfaces). \return
-  /// whether there are any
-  template <class Which>
-  bool setDrift(const Vector3<Scalar>& drift, const Scalar& driftChange, Which&& which) {
-    constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
-    std::vector<std::array<std::uint32_t, 2>> numbers(surfaces.size(), {none, none});  // old and new drift
+  /// Other drifts, for the contacts c of which driftOf(c) tells one that lasts for the call, and not nullptr;
+  /// those that shared a surface and are told the same one share the new one, and surfaces that no contact
+  /// has are forgotten. Where all have it already nothing changes. O(contacts + surfaces). \return whether
+  /// any has another
+  template <class DriftOf>
+  bool setDrifts(DriftOf&& driftOf) {
+    const auto otherOf = [&](const Contact<Scalar>& c) -> const SurfaceDrift<Scalar>* {
+      const SurfaceDrift<Scalar>* const now = driftOf(c);
+      const bool same = now != nullptr && detail::equalIsSame<Scalar> && surface(c).drift == now->velocity &&
+                        surface(c).driftChange == now->change;
+      return same ? nullptr : now;
+    };
+    const bool any = std::any_of(begin(), end(), otherOf);
+    if (!any && surfaces.size() <= contacts.size()) {
+      return false;
+    }
+    std::map<std::pair<std::uint32_t, const SurfaceDrift<Scalar>*>, std::uint32_t> numbers;
     std::vector<ContactSurface<Scalar>> used;
-    bool any = false;
     for (Contact<Scalar>& c : contacts) {
-      const bool other = which(c);
-      std::uint32_t& number = numbers[c.surface][other ? 1 : 0];
-      if (number == none) {
-        number = static_cast<std::uint32_t>(used.size());
-        used.push_back(surfaces[c.surface]);
-        if (other) {
-          used.back().drift = drift;
-          used.back().driftChange = driftChange;
+      const SurfaceDrift<Scalar>* const other = otherOf(c);
+      const auto [place, isNew] =
+          numbers.try_emplace({c.surface, other}, static_cast<std::uint32_t>(used.size()));
+      if (isNew) {
+        used.push_back(surface(c));
+        if (other != nullptr) {
+          used.back().drift = other->velocity;
+          used.back().driftChange = other->change;
         }
       }
-      c.surface = number;
-      any = any || other;
+      c.surface = place->second;
     }
     surfaces.swap(used);
     return any;

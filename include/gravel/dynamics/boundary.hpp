@@ -156,6 +156,14 @@ class Boundaries {
     planes_.erase(planes_.begin() + static_cast<std::ptrdiff_t>(indexOf(number)));
   }
 
+  /// Its place among planes(), or how many they are if none has that number. O(log planes).
+  std::size_t find(std::size_t number) const {
+    const auto before = [&](const Plane<Scalar>& plane) { return plane.number < number; };
+    const auto place = std::partition_point(planes_.begin(), planes_.end(), before);
+    const bool found = place != planes_.end() && place->number == number;
+    return found ? static_cast<std::size_t>(place - planes_.begin()) : planes_.size();
+  }
+
   /// What a new plane is given it has from the start; others get there within the next step.
   /// \throws std::invalid_argument for a velocity that is not finite; std::out_of_range as above
   void setVelocity(std::size_t number, const Vector3<Scalar>& velocity) {
@@ -195,14 +203,12 @@ class Boundaries {
   }
 
  private:
-  /// O(log planes).
   std::size_t indexOf(std::size_t number) const {
-    const auto before = [&](const Plane<Scalar>& plane) { return plane.number < number; };
-    const auto place = std::partition_point(planes_.begin(), planes_.end(), before);
-    if (place == planes_.end() || place->number != number) {
+    const std::size_t place = find(number);
+    if (place == planes_.size()) {
       throw std::out_of_range("gravel: no plane has the number " + std::to_string(number));
     }
-    return static_cast<std::size_t>(place - planes_.begin());
+    return place;
   }
 
   std::vector<Plane<Scalar>> planes_;

@@ -249,8 +249,8 @@ class ContactStage {
     std::optional<std::uint64_t> revision;  ///< of the bodies that it is of
   };
   const Present& present(const Bodies& bodies) const;
-
-  void setDrift(std::size_t plane, const Vector3<Scalar>& drift, const Scalar& change);
+  template <class DriftOf>
+  void setDrifts(DriftOf&& driftOf);
   /// \param settled  blows, of which those that rest count like contacts
   void findCarried(const Bodies& bodies, const Scalar& h, std::span<const Impact<Scalar>> settled = {});
   void carryAll(const Bodies& bodies, const Scalar& h);

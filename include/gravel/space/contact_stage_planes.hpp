@@ -11,15 +11,21 @@ namespace gravel {
 template <Real Scalar, class Layout>
 void ContactStage<Scalar, Layout>::setPlaneVelocity(std::size_t plane, const Vector3<Scalar>& velocity) {
   boundaries.setVelocity(plane, velocity);
-  setDrift(plane, velocity, Scalar(0));
+  const SurfaceDrift<Scalar> now{velocity, Scalar(0)};
+  if (contacts_.setDrifts([&](const Contact<Scalar>& c) {
+        return c.second == staticPartner && c.key2 == boundaryKey(plane) ? &now : nullptr;
+      })) {
+    contactsChanged();
+  }
 }
 
 template <Real Scalar, class Layout>
 void ContactStage<Scalar, Layout>::drivePlanes(const Bodies& bodies, const Scalar& share, const Scalar& h) {
-  for (const Plane<Scalar>& plane : boundaries.planes()) {
-    if (!plane.isSteady()) {
-      setDrift(plane.number, plane.velocityAt(share), Scalar(2) * plane.swing());
-    }
+  const auto steady = [](const Plane<Scalar>& plane) { return plane.isSteady(); };
+  if (!std::all_of(boundaries.planes().begin(), boundaries.planes().end(), steady)) {
+    setDrifts([&](const Plane<Scalar>& plane) {
+      return SurfaceDrift<Scalar>{plane.velocityAt(share), Scalar(2) * plane.swing()};
+    });
   }
   findCarried(bodies, h);
 }
@@ -37,12 +43,9 @@ void ContactStage<Scalar, Layout>::findCarried(const Bodies& bodies, const Scala
   }
   const std::vector<ContactName> touching = whoTouches(settled);
   const auto speedUp = [&](std::uint64_t key) {
-    for (const Plane<Scalar>& plane : boundaries.planes()) {
-      if (boundaryKey(plane.number) == key) {
-        return Scalar(Scalar(2) * plane.swing() / h);
-      }
-    }
-    return Scalar(0);
+    const std::size_t place = boundaries.find(key - boundaryKey(0));
+    const auto& planes = boundaries.planes();
+    return place < planes.size() ? Scalar(Scalar(2) * planes[place].swing() / h) : Scalar(0);
   };
   ContactIslands islands;
   islands.find(std::span<const ContactName>(touching), bodies);
@@ -128,17 +131,21 @@ Scalar ContactStage<Scalar, Layout>::fastestSwing() const {
   return most;
 }
 
-/// What touches the plane sees it move at this velocity, which changes by so much along n in a step. Where it
-/// does already, nothing changes.
+/// What touches a plane sees it move as driftOf(plane) tells. Where all do already, nothing changes. O(planes
+/// + contacts).
 template <Real Scalar, class Layout>
-void ContactStage<Scalar, Layout>::setDrift(std::size_t plane, const Vector3<Scalar>& drift,
-                                            const Scalar& change) {
-  const auto differs = [&](const Contact<Scalar>& c) {
-    return c.second == staticPartner && c.key2 == boundaryKey(plane) &&
-           !(detail::equalIsSame<Scalar> && contacts_.drift(c) == drift &&
-             contacts_.surface(c).driftChange == change);
-  };
-  if (contacts_.setDrift(drift, change, differs)) {
+template <class DriftOf>
+void ContactStage<Scalar, Layout>::setDrifts(DriftOf&& driftOf) {
+  std::vector<SurfaceDrift<Scalar>> drifts;
+  drifts.reserve(boundaries.planes().size());
+  for (const Plane<Scalar>& plane : boundaries.planes()) {
+    drifts.push_back(driftOf(plane));
+  }
+  if (contacts_.setDrifts([&](const Contact<Scalar>& c) -> const SurfaceDrift<Scalar>* {
+        const std::size_t place =
+            c.second == staticPartner ? boundaries.find(c.key2 - boundaryKey(0)) : drifts.size();
+        return place < drifts.size() ? &drifts[place] : nullptr;
+      })) {
     contactsChanged();
   }
 }

@@ -168,9 +168,8 @@ void ContactStage<Scalar, Layout>::add(const ContactList<Scalar>& contacts,
     }
   }
   std::sort(contacts_.begin(), contacts_.end(), byKeys);
-  for (const Plane<Scalar>& plane : boundaries.planes()) {  // which may have stopped since
-    setDrift(plane.number, plane.velocity, Scalar(0));
-  }
+  // Planes may have stopped since.
+  setDrifts([](const Plane<Scalar>& plane) { return SurfaceDrift<Scalar>{plane.velocity, Scalar(0)}; });
   contactsChanged();
   moved_ = false;
 }
