@@ -129,6 +129,38 @@ void checkParts(const ContactColoring& coloring) {
   }
 }
 
+/// One value for all bodies.
+template <class T>
+struct SameForAll {
+  T value;
+  const T& operator[](std::size_t) const { return value; }
+};
+
+/// Bodies whose ids fall with their indices, which count look-ups beyond the last one.
+struct WatchedBodies {
+  std::size_t n;
+  std::size_t* beyond;
+  struct Ids {
+    std::size_t n;
+    std::size_t* beyond;
+    std::uint64_t operator[](std::size_t i) const {
+      *beyond += i < n ? 0U : 1U;
+      return 100 - i;
+    }
+  };
+  std::size_t size() const { return n; }
+  SameForAll<Vector3<double>> positions() const { return {Vector3<double>::Zero()}; }
+  SameForAll<Vector3<double>> velocities() const { return positions(); }
+  SameForAll<Vector3<double>> angularVelocities() const { return positions(); }
+  SameForAll<Vector3<double>> accelerations() const { return positions(); }
+  SameForAll<double> masses() const { return {1.0}; }
+  SameForAll<double> radii() const { return {1.0}; }
+  SameForAll<double> inertiaFactors() const { return {0.4}; }
+  SameForAll<std::uint32_t> flags() const { return {0}; }
+  SameForAll<std::uint32_t> materials() const { return {0}; }
+  Ids ids() const { return {n, beyond}; }
+};
+
 }  // namespace
 
 TEST_CASE("colorGraph: valid and within degree + 1 colours on random graphs, however edges are listed") {
@@ -630,6 +662,23 @@ TEST_CASE(
     CHECK(found[number] == sizes[island]);  // whole, in one bundle
   }
   checkParts(coloring);
+}
+
+// Seen to fail: the ids of places looked up of bodies that are gone (a look-up beyond the end).
+TEST_CASE("slots of bodies that are gone are not looked up") {
+  const auto row = [](std::uint32_t n) {
+    std::vector<Contact<double>> contacts;
+    for (std::uint32_t i = n - 1; i > 0; --i) {
+      contacts.push_back({i, i - 1, 100 - i, 101 - i, Vector3<double>::UnitX(), 0.0, 1.0, 1.0});
+    }
+    return contacts;
+  };
+  std::size_t beyond = 0;
+  ContactColoring coloring;
+  coloring.build(std::span<const Contact<double>>(row(6)), WatchedBodies{6, &beyond});
+  coloring.build(std::span<const Contact<double>>(row(3)), WatchedBodies{3, &beyond});
+  CHECK(coloring.bodies().size() == 3);
+  CHECK(beyond == 0);
 }
 
 // Seen to fail: one of 63 contacts with fixed bodies found no colour, and was solved away from the others.

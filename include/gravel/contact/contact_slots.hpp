@@ -87,7 +87,8 @@ class ContactSlots {
     const std::uint32_t slots = staticSlot();
     const auto isWrong = [&](std::size_t slot) {
       const std::uint32_t body = bodyOfSlot_[slot];
-      return body >= bodies.size() || (slot > 0 && ids[body] < ids[bodyOfSlot_[slot - 1]]);
+      const std::uint32_t before = bodyOfSlot_[slot > 0 ? slot - 1 : 0];  // may be gone as well
+      return body >= bodies.size() || before >= bodies.size() || ids[body] < ids[before];
     };
     if (slotOfBody_.size() < bodies.size() || firstOf(slots, isWrong) < slots) {
       return false;
