@@ -29,7 +29,11 @@ namespace gravel {
 /// and loses all of it. A slip that friction turned back, b times as fast, lacks (a_1 - a_0)_t (t - h/2)/2 in
 /// the same way, and friction -(1 + b) m_t times that, as at the arms of that moment. Blows after which a
 /// pair is pressed together, other friction, and what resists turning are left as they are; and so is a pair
-/// that has turned by more than 60 degrees since. In a uniform field a_1 = a_0, and nothing changes.
+/// that has turned by more than 60 degrees since, or of which the lighter one was struck `mostPerBody` times
+/// since. In a uniform field a_1 = a_0, and nothing changes.
+/// So much is right while du is small beside u. It counts as u at most, and so with the slip: no blow pulls,
+/// nor strikes more than twice as hard. (By all of du, and in each of thousands of blows of a grain between
+/// two others, which each turn round what the last one made up, balls gained 1e5 times their energy.)
 template <Real S>
 class LateBlows {
  public:
@@ -65,14 +69,19 @@ class LateBlows {
   Made makeUp(B& bodies, const Domain<S>& domain, const S& time, const S& h, ImpulseOf&& impulseOf,
               Change&& change) {
     Made made;
+    findLast(bodies);
     for (const Blow& blow : blows_) {
       const bool sticks = blow.decided && blow.parting == S(0);
+      if (!sticks && !blow.last) {
+        continue;
+      }
       const S since = sticks ? blow.time : S(blow.time - h / S(2));
       const Vector3<S> lack = (pull(bodies, blow) - blow.pull) * (since / S(2));
       if (detail::equalIsSame<S> && lack == Vector3<S>::Zero()) {
         continue;
       }
-      const S du = -blow.normal.dot(lack);
+      const S all = -blow.normal.dot(lack);
+      const S du = sticks ? all : std::clamp<S>(all, -blow.speed, blow.speed);
       const bool boundary = blow.second == staticPartner;
       Vector3<S> n = blow.normal;
       S distance = bodies.radii()[blow.first];
@@ -102,8 +111,14 @@ class LateBlows {
         const S c = distance / reach;
         const S spin1 = spinOf(bodies, blow.first, share.first);
         const S spin2 = boundary ? S(0) : spinOf(bodies, blow.second, share.second);
-        const Vector3<S> slip = lack - n.dot(lack) * n;
-        const Vector3<S> dv_t = slip * -((S(1) + blow.fling) / (S(1) + c * c * (spin1 + spin2)));
+        const S turned = (S(1) + blow.fling) / (S(1) + c * c * (spin1 + spin2));
+        Vector3<S> slip = lack - n.dot(lack) * n;
+        const S most = detail::safeNorm(impulse.tangential) / share.effective;
+        const S size = turned * detail::safeNorm(slip);
+        if (size > most) {
+          slip *= S(most / size);
+        }
+        const Vector3<S> dv_t = slip * -turned;
         made.frictionLoss -= (S(1) - blow.fling) * impulse.tangential.dot(slip);
         blows += impulse.tangential;
         impulse.tangential += share.effective * dv_t;
@@ -139,10 +154,37 @@ class LateBlows {
     Vector3<S> pull;  ///< [m s^-2] a_2 - a_1 of the two bodies
     S time;           ///< [s]
     S speed;
-    bool decided;  ///< by somebody else, who gave
-    S parting;     ///< [m s^-1] along the normal, 0 to two that shall merge
-    S fling;       ///< of a slip that was turned back, the share
+    bool decided;      ///< by somebody else, who gave
+    S parting;         ///< [m s^-1] along the normal, 0 to two that shall merge
+    S fling;           ///< of a slip that was turned back, the share
+    bool last = true;  ///< one of those, see findLast()
   };
+
+  /// Most blows of a body in a step that are made up, the last ones.
+  static constexpr std::uint8_t mostPerBody = 4;
+
+  /// Marks the last `mostPerBody` blows of each body in which it is the lighter one, or either of two as
+  /// heavy. O(bodies), if there are more blows.
+  template <ContactBodies B>
+  void findLast(const B& bodies) {
+    struck_.assign(blows_.size() > mostPerBody ? bodies.size() : 0, 0);
+    for (auto blow = blows_.rbegin(); blow != blows_.rend() && !struck_.empty(); ++blow) {
+      const bool alone = blow->second == staticPartner || !detail::isMovable(bodies, blow->second);
+      const bool moves = detail::isMovable(bodies, blow->first);
+      const S m1 = bodies.masses()[blow->first];
+      const S m2 = alone ? m1 : S(bodies.masses()[blow->second]);
+      const auto count = [&](std::uint32_t body) {
+        blow->last = blow->last && struck_[body] < mostPerBody;
+        struck_[body] = static_cast<std::uint8_t>(std::min(struck_[body] + 1, mostPerBody + 0));
+      };
+      if (moves && (alone || !(m2 < m1))) {
+        count(blow->first);
+      }
+      if (!alone && (!moves || !(m1 < m2))) {
+        count(blow->second);
+      }
+    }
+  }
 
   template <class B, class Pair>
   static Vector3<S> pull(const B& bodies, const Pair& pair) {
@@ -171,6 +213,7 @@ class LateBlows {
   }
 
   std::vector<Blow> blows_;
+  std::vector<std::uint8_t> struck_;  ///< by body, in findLast()
 };
 
 }  // namespace gravel
