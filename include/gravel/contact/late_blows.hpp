@@ -105,7 +105,8 @@ class LateBlows {
       const S kept = std::min<S>(parting / blow.speed, S(1));
       Vector3<S> dv = (sticks ? S(0) : S((S(1) + kept) * du)) * n;
       // Motion and loss have J du more, of which a part is no potential's.
-      Vector3<S> blows = (share.effective * (blow.speed + parting)) * blow.normal;
+      const S counted = detail::equalIsSame<S> && du == all ? S(1) : S(du / all);
+      Vector3<S> blows = (counted * share.effective * (blow.speed + parting)) * blow.normal;
       made.restitutionLoss += share.effective * (blow.speed - kept * parting) * du;
       if (blow.fling > S(0)) {
         const S c = distance / reach;
@@ -115,12 +116,11 @@ class LateBlows {
         Vector3<S> slip = lack - n.dot(lack) * n;
         const S most = detail::safeNorm(impulse.tangential) / share.effective;
         const S size = turned * detail::safeNorm(slip);
-        if (size > most) {
-          slip *= S(most / size);
-        }
+        const S part = size > most ? S(most / size) : S(1);
+        slip *= part;
         const Vector3<S> dv_t = slip * -turned;
         made.frictionLoss -= (S(1) - blow.fling) * impulse.tangential.dot(slip);
-        blows += impulse.tangential;
+        blows += part * impulse.tangential;
         impulse.tangential += share.effective * dv_t;
         const Vector3<S> turn = c * n.cross(dv_t);
         twist(bodies, blow.first, spin1, turn);
