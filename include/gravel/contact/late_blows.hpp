@@ -105,7 +105,7 @@ class LateBlows {
       const S kept = std::min<S>(parting / blow.speed, S(1));
       Vector3<S> dv = (sticks ? S(0) : S((S(1) + kept) * du)) * n;
       // Motion and loss have J du more, of which a part is no potential's.
-      const S counted = detail::equalIsSame<S> && du == all ? S(1) : S(du / all);
+      const S counted = du == all ? S(1) : S(du / all);
       Vector3<S> blows = (counted * share.effective * (blow.speed + parting)) * blow.normal;
       made.restitutionLoss += share.effective * (blow.speed - kept * parting) * du;
       if (blow.fling > S(0)) {
