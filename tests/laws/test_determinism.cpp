@@ -87,6 +87,39 @@ TEST_CASE("Gravity, contacts and friction are the same bits for 1, 2, 3 and 8 th
   omp_set_num_threads(threads);
   CHECK(contacts > 20 * steps);  // 670 in the first 20, while they gather
 }
+
+// Its forces, its torques, what it sees of blows and contacts, and its work. Seen to fail: sums of the work
+// over as many chunks as there are threads.
+TEST_CASE("A user's force on touching grains is the same bits for 1, 2, 3 and 8 threads") {
+  const int threads = omp_get_max_threads();
+  const std::vector<Body<double>> bodies = grains(2000);
+  std::vector<double> one;
+  for (const int many : {1, 2, 3, 8}) {
+    omp_set_num_threads(many);
+    Space<double> space = spaceOf(bodies, sticky(0.0));
+    const std::size_t floor = space.addPlane({0, 0, 1}, -1.0);
+    space.setForceHook([](Bodies<double, SoA>& all, double) {
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        all[i].force() -= Vec(all[i].mass() * (0.5 * all[i].velocity() + Vec(0, 0, 9.81)));
+        all[i].torque() -= Vec(1e-3 * all[i].inertia() * all[i].angularVelocity());
+      }
+    });
+    std::size_t touched = 0;
+    for (std::size_t i = 0; i < 20; ++i) {
+      space.setPlaneVelocity(floor, {0, 0, 0.1 * static_cast<double>(i % 5)});
+      space.computeDynamics(i);
+      touched += space.contactCount();
+    }
+    CAPTURE(many);
+    CHECK(touched > 400);
+    std::vector<double> state = stateOf(space);
+    const EnergyLedger<double> e = space.energyLedger();
+    state.insert(state.end(), {e.work, e.restitution, e.friction, e.correction});
+    one = many == 1 ? state : one;
+    CHECK(sameBits(one, state));
+  }
+  omp_set_num_threads(threads);
+}
 #endif
 
 // Contacts are ordered and coloured by ids: the order in memory does not matter, to the bit. Gravity sums in

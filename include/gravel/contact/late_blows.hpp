@@ -174,8 +174,11 @@ class LateBlows {
       const S m1 = bodies.masses()[blow->first];
       const S m2 = alone ? m1 : S(bodies.masses()[blow->second]);
       const auto count = [&](std::uint32_t body) {
-        blow->last = blow->last && struck_[body] < mostPerBody;
-        struck_[body] = static_cast<std::uint8_t>(std::min(struck_[body] + 1, mostPerBody + 0));
+        if (struck_[body] < mostPerBody) {
+          ++struck_[body];
+        } else {
+          blow->last = false;
+        }
       };
       if (moves && (alone || !(m2 < m1))) {
         count(blow->first);
