@@ -235,6 +235,68 @@ TEST_CASE("A blow that does not bounce turns back its slip as one that does, on 
   }
 }
 
+// A blow u that a step begins with is over before anything pulls or rubs: e u, and after the step e u - g h.
+// Of two balls that roll on a floor without rubbing on each other the one of speed u stops for e = 1, and
+// slides forward with mu g; the other one takes u, and slides with mu g against it. Their energies are those
+// of the two moments, so that the ledger has u^2/2 (1 - e^2). Seen to fail: the blow dealt after the first
+// kick, as what it brings comes back e times, too: e u + (1 + e) g h/2 - g h, an elastic ball that gains 4 %
+// of its energy (h = 4 ms), and balls off by mu g h/2.
+TEST_CASE("What touches as a scene begins is struck before anything pulls, on a floor, a ball and a table") {
+  constexpr double g = 9.81;
+  constexpr double u = 1.0;
+  for (const double h : {4e-3, 1e-3}) {
+    for (const double e : {0.0, 0.8, 1.0}) {
+      for (const bool onBall : {false, true}) {
+        CAPTURE(h, e, onBall);
+        SimulationConfig<double> config = plain(h);
+        config.coeffRestitution = e;
+        Space<double> space(config);
+        if (onBall) {
+          Body<double> held = ball({0, 0, -0.1}, {0, 0, 0}, 0.1);
+          held.fixed = true;
+          space.addBody(held);
+        } else {
+          space.addPlane({0, 0, 1}, 0);
+        }
+        const BodyId id = space.addBody(ball({0, 0, 0.1}, {0, 0, -u}, 0.1, 2.0));
+        space.setUniformField({0, 0, -g});
+        const double start = space.energyLedger().total();
+        space.computeDynamics(0);
+        const EnergyLedger<double> ledger = space.energyLedger();
+        CHECK_THAT(ledger.total(), WithinAbs(start, 8 * ulp));
+        if (e > 0) {
+          CHECK_THAT(space.body(id).velocity()[2], WithinAbs(e * u - g * h, 4 * ulp));
+          CHECK_THAT(space.body(id).position()[2] - 0.1, WithinAbs(e * u * h - g * h * h / 2, 4 * ulp));
+          CHECK_THAT(ledger.restitution, WithinAbs(u * u * (1 - e * e), 16 * ulp));
+          CHECK_THAT(space.supportedWeight().load[2] * h, WithinAbs(-2 * (1 + e) * u, 16 * ulp));
+        } else {
+          CHECK_THAT(space.body(id).velocity()[2], WithinAbs(0, 4 * ulp));
+        }
+      }
+      SimulationConfig<double> config = plain(h);
+      Space<double> table(config);
+      const double mu = 0.2;
+      const MaterialId smooth =
+          table.addMaterial({.restitution = e, .staticFriction = 0, .kineticFriction = 0});
+      table.setPairMaterial(smooth, defaultMaterial,
+                            {.restitution = 0, .staticFriction = mu, .kineticFriction = mu});
+      table.setUniformField({0, 0, -g});
+      table.addPlane({0, 0, 1}, 0);
+      for (const double speed : {u, 0.0}) {
+        Body<double> body =
+            ball({speed > 0 ? -0.2 : 0.0, 0, 0.1}, {speed, 0, 0}, 0.1, 1.0, {0, speed / 0.1, 0});
+        body.material = smooth;
+        table.addBody(body);
+      }
+      table.computeDynamics(0);
+      if (e > 0) {
+        CHECK_THAT(table.body(0).velocity()[0], WithinAbs((1 - e) / 2 * u + mu * g * h, 4 * ulp));
+        CHECK_THAT(table.body(1).velocity()[0], WithinAbs((1 + e) / 2 * u - mu * g * h, 4 * ulp));
+      }
+    }
+  }
+}
+
 TEST_CASE("A light sphere on one a thousand million times its mass bounces as off a wall") {
   SimulationConfig<double> config = plain(1e-4);
   config.coeffRestitution = 0.8;

@@ -59,6 +59,8 @@ class ContactStage {
               Profiler& profiler);
   /// Before a step: contacts get the surfaces that settings, pairs and bodies have by now. O(bodies).
   void renewSurfaces(const Bodies& bodies, const Config& config);
+  /// At its start: blows of what touches, if contacts were found anew. O(contacts) then.
+  void strikeTouching(Bodies& bodies, const Config& config, const Scalar& h, Profiler& profiler);
 
   // Of planes that move: contact_stage_planes.hpp.
   void setPlaneVelocity(std::size_t plane, const Vector3<Scalar>& velocity);
@@ -201,12 +203,10 @@ class ContactStage {
   /// A contact or an impact, by the ids of its bodies. \return whether they are there
   template <class Pair>
   static bool renumber(const Bodies& bodies, Pair& pair);
-
   /// Calls visit(contact, impulse) for what bore something in the first half of the part.
   template <class Visit>
   void forEachBefore(Visit&& visit) const;
   void bookKick(const Bodies& bodies, const Scalar& kick);
-
   void colour(const Bodies& bodies, Profiler& profiler) {
     if (!coloured_) {
       const Profiler::Scope scope(profiler, Phase::Colouring);
@@ -259,7 +259,6 @@ class ContactStage {
   std::vector<ContactName> whoTouches(std::span<const Impact<Scalar>> settled) const;
   Scalar fastestSwing() const;
   void renewGeometry(const Bodies& bodies, const Config& config, const Scalar& time);
-
   template <class Course>
   void strike(Bodies& bodies, const Config& config, Course& course, const Scalar& time, const Scalar& h,
               const PartOfStep<Scalar>& part, Profiler& profiler);
@@ -301,6 +300,7 @@ class ContactStage {
   std::vector<Scalar> carried_;        // of WayAhead, for the contacts of the last drivePlanes()
   Scalar separationLoss_ = Scalar(0);
   bool idle_ = false;
+  bool anew_ = false;  // contacts were found since the last step
   bool moved_ = false;
   std::vector<std::uint8_t> wasMoved_;     // by body: in the last separation
   bool acted_ = false;                     // the last solve changed velocities

@@ -1,7 +1,7 @@
 #pragma once
 
 /// \file
-/// Members of `ContactStage` that deal the impacts inside a step.
+/// Members of `ContactStage` that deal the impacts inside a step, and those with which it begins.
 
 #include <gravel/dynamics/epicycle_course.hpp>
 #include <gravel/space/contact_stage.hpp>
@@ -57,6 +57,44 @@ struct WaysAfterBlows {
 };
 
 }  // namespace detail
+
+/// The solve after the first kick would give back e times what the kick brings as well: a ball that touches
+/// the floor and falls at u left it at e u + (1 + e) g h/2. So it is made before the kick, as a step's end
+/// does.
+template <Real Scalar, class Layout>
+void ContactStage<Scalar, Layout>::strikeTouching(Bodies& bodies, const Config& config, const Scalar& h,
+                                                  Profiler& profiler) {
+  if (!std::exchange(anew_, false) || contacts_.empty()) {
+    return;
+  }
+  drivePlanes(bodies, Scalar(0), h);
+  const auto fall = [&](std::uint32_t i) {
+    return detail::isMovable(bodies, i) ? detail::safeNorm(Vector3<Scalar>(bodies.accelerations()[i]))
+                                        : Scalar(0);
+  };
+  const Scalar slow = std::max(config.restitutionThreshold, config.epsilon);
+  const auto isBlow = [&](const Contact<Scalar>& c) {  // faster than what rests approaches
+    const ContactSurface<Scalar>& surface = contacts_.surface(c);
+    Vector3<Scalar> v_rel = surface.drift - detail::velocityOf(bodies, c.first);
+    Scalar falls = fall(c.first);
+    if (c.second != staticPartner) {
+      v_rel += detail::velocityOf(bodies, c.second);
+      falls += fall(c.second);
+    }
+    return falls > Scalar(0) && -c.normal.dot(v_rel) > slow + Scalar(2) * (surface.driftChange + falls * h);
+  };
+  if (std::none_of(contacts_.contacts.begin(), contacts_.contacts.end(), isBlow)) {
+    return;
+  }
+  solve(bodies, config, h, false, profiler);
+  if (acted_) {
+    record_.add([&](auto&& visit) {
+      for (std::size_t k = 0; k < contacts_.size(); ++k) {
+        visit(contacts_[k], solver_.impulses()[k]);
+      }
+    });
+  }
+}
 
 template <Real Scalar, class Layout>
 bool ContactStage<Scalar, Layout>::foresees(const Bodies& bodies, const Config& config, const Scalar& time,

@@ -45,6 +45,7 @@ void ContactStage<Scalar, Layout>::detect(const Bodies& bodies, const Config& co
     search(bodies, config, time, AtRest{}, Scalar(0), profiler);
   }
   prepareSurfaces(config);
+  anew_ = !goesOn;
   gapStep_ = goesOn ? detail::nextGapStep(gapStep_, h) : std::max<Scalar>(gapStep_, h);
   NarrowPhaseSettings<Scalar> settings{time, config.epsilon, Scalar(0), gapStep_};
   settings.resting = names();

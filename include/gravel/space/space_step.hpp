@@ -5,6 +5,7 @@
 ///
 /// Order of a step of length h (in parts: space_substeps.hpp), with a(x) the acceleration of the last
 /// evaluation:
+///   0. where contacts were found anew, the blows of those that touch;
 ///   1. half a kick by the integrator's table; contacts of the last step are solved together, so that what
 ///      rests on something does not sink in the drift; impacts on the way are dealt at their own times;
 ///      drift;
@@ -96,6 +97,8 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration, const Sc
     if (areFewPoints()) {
       more = moveFewPoints(h, until, timing);
     } else {
+      contact_dt_ = h / Scalar(static_cast<double>(parts_));
+      contact_.strikeTouching(bodies_, this->config_, contact_dt_, profiler_);
       Scalar found(0);
       for (std::size_t part = 0; part < parts_; ++part) {
         advance(h, part, parts_, found);
