@@ -307,4 +307,84 @@ TEST_CASE("A ball that rolls over a row of balls has at each the energy of the c
   }
 }
 
+// A ball that rolls on a table which turns at W goes in circles, at 2/7 W (Earnshaw 1844): v - R w x z =
+// W z x x, as it rolls, and dw/dt = -5/(2 R) z x dv/dt by friction, make dv/dt = (2/7) W z x v, whatever its
+// spin about the vertical. The table is the pole of a ball of radius S, 1e18 times as heavy, whose slope
+// moves the other one by g t^2/(2 S) of its way at most. The rest is of second order: 0.2 (W h)^2 of it. Seen
+// to fail: the arm of friction on the heavier ball 2 % too short (0.04 and 0.1 off).
+TEST_CASE("On a table that turns a ball rolls in circles at two sevenths of its rate") {
+  constexpr double S = 1e6;
+  constexpr double W = 2.0;
+  constexpr double R = 0.1;
+  const double rate = 2.0 / 7 * W;
+  const Vec v0(0, 0.5, 0);
+  for (const double pivot : {0.0, 5.0}) {
+    for (const double h : {8e-3, 2e-3}) {
+      SimulationConfig<double> config = plain(h);
+      config.coeffRestitution = 0;
+      config.coeffFriction = config.coeffStaticFriction = 1;
+      Space<double> space(config);
+      space.setForceHook([](Bodies<double, SoA>& bodies, double) { bodies[1].force() += Vec(0, 0, -g); });
+      space.addBody(ball({0, 0, -S}, {0, 0, 0}, S, 1e18, {0, 0, W}));
+      const Vec slip = v0 - Vec(0, W, 0);  // without spin, at (1, 0)
+      space.addBody(
+          ball({1, 0, std::sqrt((S + R) * (S + R) - 1) - S}, v0, R, 1.0, {-slip[1] / R, slip[0] / R, pivot}));
+      const double turn = 2 * pi<double>() / rate;
+      for (const double share : {0.3, 0.6}) {
+        space.advanceTo(share * turn);
+        const double phase = rate * space.time();
+        const Vec circle(1 + v0[1] / rate * (std::cos(phase) - 1), v0[1] / rate * std::sin(phase), 0);
+        const Vec x = space.body(1).position();
+        CAPTURE(pivot, h, share, x - circle);
+        CHECK((x - circle).head<2>().norm() <
+              0.3 * W * W * h * h + g * space.time() * space.time() / (2 * S));
+        CHECK_THAT(space.body(1).angularVelocity()[2], WithinAbs(pivot, 1e-3));
+      }
+    }
+  }
+}
+
+// Two balls in touch roll down an incline, the upper one of the moment of inertia k1 m R^2, the lower one,
+// which alone would be slower, of k2. So the upper one pushes with N, and where they touch, one surface going
+// down and the other up, friction mu N hinders both from turning:
+//   (1 + k1) m a = m g sin - N (1 + mu),   (1 + k2) m a = m g sin + N (1 - mu),   N = (k2 - k1) m a/2.
+// All forces are constant, and steps exact but for what the first one has to find. Seen to fail: the arm of
+// friction on the second ball 2 % too short (2e-4 off).
+TEST_CASE("A ball that pushes a slower one down an incline rolls, rubbing on it, as the closed form says") {
+  constexpr double slope = 0.4;
+  constexpr double R = 0.1;
+  constexpr double m = 2.0;
+  const double k1 = 0.4;
+  const double k2 = 2.0 / 3;
+  for (const double mu : {0.0, 0.2, 0.5}) {
+    const double h = 2e-3;
+    Space<double> space(plain(h));
+    const Material<double> rough{.restitution = 0, .staticFriction = 2, .kineticFriction = 2};
+    const MaterialId floor = space.addMaterial(rough);
+    const MaterialId skin =
+        space.addMaterial({.restitution = 0.5, .staticFriction = mu, .kineticFriction = mu});
+    space.setPairMaterial(floor, skin, rough);
+    space.setUniformField({g * std::sin(slope), 0, -g * std::cos(slope)});
+    space.addPlane({0, 0, 1}, 0, floor);
+    for (const double k : {k1, k2}) {
+      Body<double> body = ball({k > k1 ? 2 * R : 0.0, 0, R}, {0, 0, 0}, R, m);
+      body.inertia = k * m * R * R;
+      body.material = skin;
+      space.addBody(body);
+    }
+    space.advanceTo(1.0);
+    const double a = g * std::sin(slope) / (1 + k1 + (k2 - k1) * (1 + mu) / 2);
+    CAPTURE(mu, a);
+    for (std::size_t i = 0; i < 2; ++i) {
+      CHECK_THAT(space.body(i).velocity()[0], WithinRel(a, 1e-9));
+      CHECK_THAT(space.body(i).position()[0] - 2 * R * double(i), WithinRel(a / 2, 1e-9));
+    }
+    double between = 0;
+    for (std::size_t c = 0; c < space.contacts().size(); ++c) {
+      between += space.contacts()[c].second == staticPartner ? 0 : space.contactImpulses()[c].normal / h;
+    }
+    CHECK_THAT(between, WithinRel(m * a * (k2 - k1) / 2, 1e-6));
+  }
+}
+
 }  // namespace test_friction
