@@ -38,11 +38,19 @@ void Gas(benchmark::State& state) {
   finish(state, watch, space.n());
   state.counters["energy_error"] = space.energyLedger().kinetic / before - 1.0;
   state.counters["hits"] = gas.hits();
+  state.counters["us_per_hit"] = watch.nanoseconds() / 1e3 / gas.hits();
+  state.counters["parts"] = static_cast<double>(space.contactSubsteps());
   state.counters["rate_over_theory"] = gas.rate() / scenes::gasCollisionRate(options.fraction);
   state.counters["pressure_over_theory"] =
       gas.compressibility(1.0) / scenes::gasCompressibility(options.fraction);
 }
-BENCHMARK(Gas)->Args({1000, 10})->Args({10000, 10})->Args({10000, 100})->Unit(benchmark::kMillisecond);
+BENCHMARK(Gas)
+    ->Args({1000, 10})
+    ->Args({10000, 10})
+    ->Args({10000, 100})
+    ->Args({10000, 1000})
+    ->Args({10000, 10000})
+    ->Unit(benchmark::kMillisecond);
 
 /// Arguments: bodies; optical depth in hundredths. After two orbits to settle.
 void Ring(benchmark::State& state) {

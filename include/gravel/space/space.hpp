@@ -162,8 +162,8 @@ class Space : public Settings<Scalar> {
   /// The next step; where steps adapt, the longest one from now on, so that the next one is not longer.
   void setTimeStep(Scalar dt);
   Scalar getPreviousTimeStep() const { return previous_dt_; }
-  /// Parts of the last step, each with its own contacts: config().contactSubsteps, or what was chosen; by an
-  /// integrator of several drifts its number of force evaluations where anything touched, else 1.
+  /// Parts of the last step, each with its own contacts: as many as asked for, or were chosen, as in a gas;
+  /// by an integrator of several drifts its number of force evaluations where anything touched, else 1.
   std::size_t contactSubsteps() const { return parts_; }
 
   Scalar getG() const { return this->config_.G; }
@@ -259,6 +259,7 @@ class Space : public Settings<Scalar> {
   bool areFewPoints() const;
   std::size_t moveFewPoints(const Scalar& h, const Scalar* until, Profiler::Step& timing);
   bool hasSeveralDrifts() const;
+  std::size_t partsOfGas(const Scalar& h);
   std::size_t chooseParts(const Scalar& h);
   void advance(const Scalar& h, std::size_t part, std::size_t parts, Scalar& found);
   void check(const Scalar& h) const;
@@ -299,7 +300,6 @@ class Space : public Settings<Scalar> {
   EnergyLedger<Scalar> left_;  // the processes' part of the ledger
   bool ledgerOpen_ = false;    // bodies added before the first step belong to the start
   Scalar lastTotalEnergy_ = Scalar(std::numeric_limits<double>::infinity());
-
   OrbitStage<Scalar, Layout> orbits_;
   PileStep<Scalar> piles_;
   Compensation<Scalar> lost_;  // what kicks and drifts lost to rounding

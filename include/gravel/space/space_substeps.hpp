@@ -24,6 +24,7 @@
 /// Verlet with forces of its own: it costs no more, contacts and impacts are what they are there, and the
 /// error of the others is that of h/n, of order 2. All other steps have the order of the method.
 
+#include <gravel/contact/gas_parts.hpp>
 #include <gravel/dynamics/epicycle.hpp>
 #include <gravel/space/space.hpp>
 
@@ -70,7 +71,29 @@ bool Space<Scalar, Layout>::hasSeveralDrifts() const {
   return traitsOf(this->config_.integrator).stages.size() > 1;
 }
 
-/// Into how many parts a step of length h is divided. With one drift and where motion chooses: no two bodies
+/// As many as `wanted`, 1 at least and mostChosenSubsteps at most.
+template <Real Scalar>
+std::size_t chosenSubsteps(const Scalar& wanted) {
+  std::size_t parts = 1;
+  while (parts < mostChosenSubsteps && Scalar(static_cast<double>(parts)) < wanted) {
+    ++parts;
+  }
+  return parts;
+}
+
+/// In a gas as many as take the least time: detail::cheapestParts(). Only where parts are the same map, since
+/// hardly anything touches, and forces depend on no body's place.
+template <Real Scalar, class Layout>
+std::size_t Space<Scalar, Layout>::partsOfGas(const Scalar& h) {
+  constexpr std::size_t few = 256;  // are seen at once
+  if (n() < few || contacts().size() > n() / 8 || !(getG() == Scalar(0)) || force_.hook ||
+      this->config_.integrator != IntegratorKind::VelocityVerlet) {
+    return 1;
+  }
+  return detail::cheapestParts<Scalar>(bodies_, contact_.domain, h, mostChosenSubsteps);
+}
+
+/// Into how many parts a step of length h is divided, as motion chooses. With one drift: no two bodies
 /// that touch move past each other by more than a quarter of the smaller radius r in a part, nor would at the
 /// speed of a fall by r at their relative acceleration, for the flanks of heaps creep in longer steps; and
 /// piles held by their own gravity rest.
@@ -82,8 +105,9 @@ std::size_t Space<Scalar, Layout>::chooseParts(const Scalar& h) {
                ? static_cast<std::size_t>(traitsOf(this->config_.integrator).forceEvaluations)
                : 1;
   }
+  const std::size_t ofGas = partsOfGas(h);
   if (this->config_.contactSubsteps != 0) {
-    return this->config_.contactSubsteps;
+    return std::max(this->config_.contactSubsteps, ofGas);
   }
   const HillFrame<Scalar> frame(contact_.domain);
   const auto accelerationOf = [&](std::uint32_t i) {
@@ -106,11 +130,7 @@ std::size_t Space<Scalar, Layout>::chooseParts(const Scalar& h) {
   }
   const Scalar rests = getG() == Scalar(0) ? Scalar(0) : Scalar(h / piles_.longest(bodies_, contacts()));
   const Scalar wanted = std::max<Scalar>(Scalar(4) * h * Scalar(sqrt(rate_sq)), rests);
-  std::size_t parts = 1;
-  while (parts < mostChosenSubsteps && Scalar(static_cast<double>(parts)) < wanted) {
-    ++parts;
-  }
-  return parts;
+  return std::max(chosenSubsteps<Scalar>(wanted), ofGas);
 }
 
 /// One part of a step of length h.

@@ -180,11 +180,11 @@ class NeighbourList {
       bend_ = std::max<S>(bend_, part.bend);
       swift_.insert(swift_.end(), part.swift.begin(), part.swift.end());
     }
-    if (comparisons_ + swift_.size() <= mostComparisons && swift_.size() <= mostSwift(n)) {
+    if (comparisons_ + swift_.size() <= mostComparisons && swift_.size() <= mostSwift_) {
       return nullptr;
     }
     moved_sq_ = std::max<S>(moved_sq_, half_ * half_);
-    for (std::size_t c = 0; c < parts_.size() && swift_.size() > mostSwift(n); ++c) {
+    for (std::size_t c = 0; c < parts_.size() && swift_.size() > mostSwift_; ++c) {
       moved_sq_ = std::max<S>(moved_sq_, parts_[c].most_sq);
     }
     return tooFar;
@@ -250,6 +250,7 @@ class NeighbourList {
     using std::sqrt;
     const S updates = S(static_cast<double>(std::max<std::uint64_t>(1, updates_)));
     const S perUpdate = motionSeen ? S(S(2) * S(sqrt(moved_sq_)) / updates) : S(0);
+    mostSwift_ = std::min<std::size_t>(8, n / 64);
     skin_ = fixedSkin_ ? *fixedSkin_ : detail::skinFor(spheres, perUpdate);
     swift_.clear();
     flow_ = S(0);
@@ -259,8 +260,9 @@ class NeighbourList {
         common_.findAhead(n, travel, S(skin_ / S(8)));
       }
       bend_ += detail::sumAbs(common_.bend());
-      skin_ = std::max<S>(
-          skin_, detail::takeSwift(n, mostSwift(n), skin_, common_.lessThis(positions, travel), swift_));
+      const auto ones = detail::takeSwift(n, skin_, common_.lessThis(positions, travel), swift_);
+      mostSwift_ = ones.most;
+      skin_ = std::max<S>(skin_, S(2) * S(sqrt(ones.next_sq)));
     }
     free_ = skin_;
     setHalf();
@@ -281,7 +283,6 @@ class NeighbourList {
   static constexpr const char* tooFar = "bodies moved half the skin";
   static constexpr std::size_t chunk = 512;
   static constexpr std::size_t mostComparisons = 128;  ///< of one with all, that cost what a search does
-  static std::size_t mostSwift(std::size_t n) { return std::min<std::size_t>(8, n / 64); }
 
   BroadPhase<S> search_;
   std::vector<Pair> pairs_;
@@ -292,7 +293,8 @@ class NeighbourList {
   std::vector<std::vector<Pair>> swiftPairs_;  ///< of each of them
   std::vector<Pair> extra_;                    ///< all of these, and more that were added
   std::vector<Pair> joined_;                   ///< pairs_ and extra_
-  std::size_t comparisons_ = 0;                ///< since the last search
+  std::size_t mostSwift_ = 0;
+  std::size_t comparisons_ = 0;  ///< since the last search
   Domain<S> domain_;
   S time_ = S(0);
   S now_ = S(0);  ///< of the last update

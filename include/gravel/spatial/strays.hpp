@@ -8,6 +8,8 @@
 #include <gravel/spatial/common_motion.hpp>
 #include <gravel/spatial/pair.hpp>
 
+#include <span>
+
 namespace gravel {
 
 namespace detail {
@@ -153,39 +155,50 @@ void compare(std::uint32_t i, const Positions& positions, const Radii& radii, co
   }
 }
 
-/// Appends to `swift` the bodies that may outrun any skin, at most `most` of the n, fastest first, and leaves
-/// `swift` sorted; none that the skin [m] holds. O(N).
-/// \return [m] twice the way of the next one
+/// Which bodies may outrun any skin: the few fastest, or so many more as are a crowd of bullets.
+template <Real S>
+struct SwiftOnes {
+  std::size_t most = 0;  ///< how many they are at most
+  S next_sq = S(0);      ///< [m^2] square of the longest way of all others
+
+  /// Eight, or up to 64 where those leave others less than a fourth of the way; no more than one in 64. O(N).
+  /// \param ways_sq [m^2] squares of all ways, which this puts in another order
+  static SwiftOnes of(std::span<S> ways_sq) {
+    const std::size_t n = ways_sq.size();
+    const auto longestBut = [&](std::size_t most) {
+      const auto place = ways_sq.begin() + static_cast<std::ptrdiff_t>(most);
+      std::nth_element(ways_sq.begin(), place, ways_sq.end(), [](const S& a, const S& b) { return b < a; });
+      return SwiftOnes{most, *place};
+    };
+    if (n == 0) {
+      return {};
+    }
+    const SwiftOnes few = longestBut(std::min<std::size_t>(8, n / 64));
+    const SwiftOnes many = longestBut(std::min<std::size_t>(64, n / 64));
+    return S(16) * many.next_sq < few.next_sq ? many : few;
+  }
+};
+
+/// Puts the swift ones of n bodies in `swift`, in order; none that the skin [m] holds. O(N).
+/// \return how many may be, and whose ways the list must hold
 template <Real S, class Travel>
-S takeSwift(std::size_t n, std::size_t most, const S& skin, const Travel& travel,
-            std::vector<std::uint32_t>& swift) {
-  using std::sqrt;
+SwiftOnes<S> takeSwift(std::size_t n, const S& skin, const Travel& travel,
+                       std::vector<std::uint32_t>& swift) {
   std::vector<S> ways(n);
   for (std::size_t i = 0; i < n; ++i) {
     ways[i] = squareOfSum<S>(wayOf<S>(travel, i).squaredNorm(), bendOf_sq<S>(travel, i));
     if (!isFinite(ways[i])) {
-      return S(0);  // the search will say which
+      return {};  // the search will say which
     }
   }
-  if (n == 0) {
-    return S(0);
-  }
-  std::vector<std::uint32_t> order(n);
-  std::iota(order.begin(), order.end(), 0U);
-  most = std::min(most, n - 1);
-  const auto faster = [&](std::uint32_t a, std::uint32_t b) {
-    return ways[a] > ways[b] || (ways[a] == ways[b] && a < b);
-  };
-  std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(most), order.end(), faster);
-  const S enough = S(2) * S(sqrt(ways[order[most]]));
-  const S thick = std::max<S>(skin, enough);
-  for (std::size_t k = 0; k < most; ++k) {
-    if (S(4) * ways[order[k]] > thick * thick) {
-      swift.push_back(order[k]);
+  std::vector<S> sorted = ways;
+  const SwiftOnes<S> ones = SwiftOnes<S>::of(sorted);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (ways[i] > ones.next_sq && S(4) * ways[i] > skin * skin) {
+      swift.push_back(static_cast<std::uint32_t>(i));
     }
   }
-  std::sort(swift.begin(), swift.end());
-  return enough;
+  return ones;
 }
 
 /// `pairs` and `extra`, which is left sorted and without doubles, in one list, in the order of ids; without
