@@ -59,6 +59,25 @@ class ImpactForecast : protected ImpactPast<S> {
                                               drift, scene.settings.time);
     return relativeFlight(one, two, r, drift, scene.settings.h);
   }
+  /// When two meet after `from`: of the image on this flight, and of the one that is nearest halfway from
+  /// there to the end, the first. With a relative way w no other comes nearer than (L - w)/2 in a box of edge
+  /// L.
+  template <class Scene>
+  static std::optional<S> meeting(const Scene& scene, const Flight& one, const Flight& two,
+                                  const RelativeFlight<S>& flight, const S& from) {
+    const S reach = one.radius + two.radius;
+    const std::optional<S> t = timeOfImpact<S>(flight, reach, from);
+    if (scene.domain.isOpen()) {
+      return t;
+    }
+    Vector3<S> drift;
+    const RelativeFlight<S> other = flightOf(scene, one, two, S((from + scene.settings.h) / S(2)), drift);
+    if (other.r == flight.r) {
+      return t;
+    }
+    const std::optional<S> later = timeOfImpact<S>(other, reach, from);
+    return later && (!t || *later < *t) ? later : t;
+  }
   template <class Scene>
   static RelativeFlight<S> flightOf(const Scene& scene, const Flight& one, const HalfSpace<S>& wall) {
     return {Vector3<S>(one.x - wall.offset * wall.normal), Vector3<S>(one.v - wall.velocity), one.a,
@@ -137,7 +156,7 @@ class ImpactForecast : protected ImpactPast<S> {
       const Flight one = Flight::of(scene, i);
       const Flight two = Flight::of(scene, j);
       const auto flight = relativeFlight(one, two, r, drift, scene.settings.h);
-      if (const auto t = timeOfImpact<S>(flight, S(one.radius + two.radius), S(0))) {
+      if (const auto t = meeting(scene, one, two, flight, S(0))) {
         out.push_back({*t, i, j, keys.first, keys.second});
       }
     }
@@ -240,7 +259,7 @@ class ImpactForecast : protected ImpactPast<S> {
     const bool held = isHeld(scene, i, j, keys, number);
     const Vector3<S> at = held ? flight.place(from) : flight.r;
     const bool flies = !held || isApart(S(detail::safeNorm(at) - reach), reach);
-    if (const auto t = flies ? timeOfImpact<S>(flight, reach, from)
+    if (const auto t = flies ? meeting(scene, one, two, flight, from)
                              : driven(scene, i, j, flight, detail::safeUnit(at), from)) {
       queue_.push({*t, i, j, keys.first, keys.second}, histories_);
     }

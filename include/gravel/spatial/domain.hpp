@@ -44,9 +44,9 @@ inline S nearestInteger(const S& x) {
 /// offset (3/2) Omega Lx t in y and by (3/2) Omega Lx in v_y (Wisdom & Tremaine 1988, AJ 95, 925). In z it is
 /// a box as well: what leaves at the top comes in at the bottom, in the first step where it was put outside.
 /// Only gravity and the vertical field know no images in z, so let the box be higher than bodies get. The
-/// radii of two that touch must add up to at most half an edge, and bodies go less than half a box in a step:
-/// of each pair only the image that is nearest where a step begins, or a blow sends one of them elsewhere, is
-/// looked at.
+/// radii of two that touch must add up to at most half an edge, and what two go past each other in a step to
+/// an edge less twice those at most: of each pair only the images are looked at that are nearest where a step
+/// begins, or a blow sends one of them elsewhere, and halfway from there to its end.
 template <Real S>
 class Domain {
  public:
@@ -122,11 +122,12 @@ class Domain {
     if (isOpen()) {
       return r;
     }
-    Vector3<S> later = r + way;
+    const Vector3<S> later = r + way;
+    Vector3<S> image = later;
     Vector3<S> drift = Vector3<S>::Zero();
-    minimumImage(later, drift, S(time + t));
+    minimumImage(image, drift, S(time + t));
     v += drift;
-    return later - way - t * drift;
+    return r + Vector3<S>(image - later) - t * drift;  // r itself, if it is that one
   }
 
   /// Brings a body into the box, with the velocity that its image there has. Nothing in an open domain.

@@ -180,11 +180,11 @@ class NeighbourList {
       bend_ = std::max<S>(bend_, part.bend);
       swift_.insert(swift_.end(), part.swift.begin(), part.swift.end());
     }
-    if (comparisons_ + swift_.size() <= mostComparisons && swift_.size() <= mostSwift_) {
+    if (comparisons_ + swift_.size() <= mostComparisons && swift_.size() <= ones_.most) {
       return nullptr;
     }
     moved_sq_ = std::max<S>(moved_sq_, half_ * half_);
-    for (std::size_t c = 0; c < parts_.size() && swift_.size() > mostSwift_; ++c) {
+    for (std::size_t c = 0; c < parts_.size() && swift_.size() > ones_.most; ++c) {
       moved_sq_ = std::max<S>(moved_sq_, parts_[c].most_sq);
     }
     return tooFar;
@@ -250,7 +250,6 @@ class NeighbourList {
     using std::sqrt;
     const S updates = S(static_cast<double>(std::max<std::uint64_t>(1, updates_)));
     const S perUpdate = motionSeen ? S(S(2) * S(sqrt(moved_sq_)) / updates) : S(0);
-    mostSwift_ = std::min<std::size_t>(8, n / 64);
     skin_ = fixedSkin_ ? *fixedSkin_ : detail::skinFor(spheres, perUpdate);
     swift_.clear();
     flow_ = S(0);
@@ -260,10 +259,9 @@ class NeighbourList {
         common_.findAhead(n, travel, S(skin_ / S(8)));
       }
       bend_ += detail::sumAbs(common_.bend());
-      const auto ones = detail::takeSwift(n, skin_, common_.lessThis(positions, travel), swift_);
-      mostSwift_ = ones.most;
-      skin_ = std::max<S>(skin_, S(2) * S(sqrt(ones.next_sq)));
     }
+    ones_ = detail::takeSwift(n, skin_, common_.lessThis(positions, travel), swift_);
+    skin_ = std::max<S>(skin_, S(2) * S(sqrt(ones_.next_sq)));
     free_ = skin_;
     setHalf();
     comparisons_ = 0;
@@ -293,8 +291,8 @@ class NeighbourList {
   std::vector<std::vector<Pair>> swiftPairs_;  ///< of each of them
   std::vector<Pair> extra_;                    ///< all of these, and more that were added
   std::vector<Pair> joined_;                   ///< pairs_ and extra_
-  std::size_t mostSwift_ = 0;
-  std::size_t comparisons_ = 0;  ///< since the last search
+  detail::SwiftOnes<S> ones_;                  ///< that may be swift
+  std::size_t comparisons_ = 0;                ///< since the last search
   Domain<S> domain_;
   S time_ = S(0);
   S now_ = S(0);  ///< of the last update

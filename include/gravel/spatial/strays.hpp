@@ -95,7 +95,8 @@ S skinFor(std::vector<S>& radii, const S& perUpdate) {
 /// \param ahead [1] of CommonMotion, less whose frame these ways are
 /// \param slack [m] added to the sum of the radii
 /// \param free [m] what is left of the skin \param most [m] bend of any
-/// \param share [1] of the ways after which the image that is nearest is looked at: see Domain::imageAt()
+/// \param share [1] of the ways after which they are on them: of the images that are nearest there, and
+/// halfway to the end, see Domain::imageAt()
 template <Real S, class Positions, class Radii, class Ids, class Travel>
 void compare(std::uint32_t i, const Positions& positions, const Radii& radii, const Ids& ids,
              const Vector3<S>& own, const Travel& travel, const S& ahead, const S& slack, const S& free,
@@ -105,7 +106,8 @@ void compare(std::uint32_t i, const Positions& positions, const Radii& radii, co
   S length_sq = way.squaredNorm();
   using std::sqrt;
   const S bend = S(sqrt(bendOf_sq<S>(travel, i)));
-  const S t = ahead == S(0) ? S(0) : S(share * ahead / (S(1.5) * domain.omega()));
+  const bool sheared = !(ahead == S(0));
+  const S h = sheared ? S(ahead / (S(1.5) * domain.omega())) : S(0);  // [s]
   const S aside = slack + free + bend + most;
   S widest = aside + S(sqrt(length_sq));
   const S rounded = S(1) + S(16) * roundoff<S>();
@@ -118,38 +120,41 @@ void compare(std::uint32_t i, const Positions& positions, const Radii& radii, co
     }
     const Vector3<S> way_j = wayOf<S>(travel, j);
     const Vector3<S> apart = Vector3<S>(positions[j]) - x;
-    const auto nearestThen = [&] {
+    const auto nearestAt = [&](const S& part) {
       Vector3<S> between = way_j - own;
       between[1] -= ahead * apart[0];  // with the flow again
       Vector3<S> drift = Vector3<S>::Zero();
-      return domain.imageAt(apart, Vector3<S>(share * between), t, drift, time);
+      return domain.imageAt(apart, Vector3<S>(part * between), S(part * h), drift, time);
     };
-    Vector3<S> r = t > S(0) ? nearestThen() : domain.minimumImage(apart, time);
-    if (!(ahead == S(0))) {  // as seen from the flow where j is
-      way[1] = own[1] + ahead * r[0];
-      length_sq = way.squaredNorm();
-      widest = aside + S(sqrt(length_sq));
-    }
-    S way_sq = way_j.squaredNorm();
-    // Most are too far for any of what follows: (a + b)^2 <= 2 (a^2 + b^2).
-    const S near = radii_ij + widest;
-    if (r.squaredNorm() > S(2) * rounded * (near * near + way_sq)) {
-      continue;
-    }
-    if (share > S(0) && !(t > S(0))) {  // where images go no ways of their own none is nearer than that
-      r = nearestThen();
-    }
-    way_sq = squareOfSum<S>(way_sq, bendOf_sq<S>(travel, j));
+    const S straight_sq = way_j.squaredNorm();
     // Another course may take it anywhere within its half of the skin, which is this far at most.
-    const S far = std::max<S>(S(sqrt(way_sq)), free);
-    const S reach = radii_ij + slack + bend + far;
-    // The nearest point of the way: x + way s, 0 <= s <= 1.
-    const S s = length_sq > S(0) ? std::min<S>(S(1), std::max<S>(S(0), S(way.dot(r) / length_sq))) : S(0);
-    if (Vector3<S>(r - s * way).squaredNorm() <= reach * reach * rounded) {
-      if (id < idKey(ids[j])) {
-        out.push_back({i, j});
-      } else {
-        out.push_back({j, i});
+    const auto reaches = [&](const Vector3<S>& r) {
+      const S way_sq = squareOfSum<S>(straight_sq, bendOf_sq<S>(travel, j));
+      const S reach = radii_ij + slack + bend + std::max<S>(S(sqrt(way_sq)), free);
+      // The nearest point of the way: x + way s, 0 <= s <= 1.
+      const S s = length_sq > S(0) ? std::min<S>(S(1), std::max<S>(S(0), S(way.dot(r) / length_sq))) : S(0);
+      return Vector3<S>(r - s * way).squaredNorm() <= reach * reach * rounded;
+    };
+    for (const S& part : {share, S((S(1) + share) / S(2))}) {  // see ImpactForecast::meeting()
+      Vector3<S> r = sheared ? nearestAt(part) : domain.minimumImage(apart, time);
+      if (sheared) {  // as seen from the flow where j is
+        way[1] = own[1] + ahead * r[0];
+        length_sq = way.squaredNorm();
+        widest = aside + S(sqrt(length_sq));
+      }
+      // Most are too far for any of what follows: (a + b)^2 <= 2 (a^2 + b^2). Where images go no ways of
+      // their own none is nearer than that.
+      const S near = radii_ij + widest;
+      const bool far = r.squaredNorm() > S(2) * rounded * (near * near + straight_sq);
+      if (far && !sheared) {
+        break;
+      }
+      if (!far && reaches(sheared ? r : nearestAt(part))) {
+        out.push_back(id < idKey(ids[j]) ? Pair{i, j} : Pair{j, i});
+        break;
+      }
+      if (domain.isOpen()) {
+        break;
       }
     }
   }
