@@ -46,7 +46,7 @@ struct SimulationConfig {
   Scalar positionalCorrectionFactor = Scalar(0.4);  ///< share of each overlap removed in each part of a step
   Scalar contactTolerance = Scalar(1e-3);  ///< contact sweeps end when speeds change by less, relative
   std::size_t contactIterations = 0;       ///< most contact sweeps per solve, two a step; 0: limitSweeps()
-  std::size_t contactSubsteps = 1;         ///< contact steps per force evaluation; 0: as motion asks
+  std::size_t contactSubsteps = 1;         ///< least contact steps per force evaluation; 0: as motion asks
   Scalar sleepSpeed = Scalar(0);           ///< [m s^-1] islands slower than this fall asleep; 0: none does
   Scalar sleepTime = Scalar(0.5);          ///< [s] for which they must have been slower
   BroadPhaseKind broadPhase = BroadPhaseKind::Automatic;

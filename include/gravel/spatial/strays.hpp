@@ -170,10 +170,10 @@ struct SwiftOnes {
   /// \param ways_sq [m^2] squares of all ways, which this puts in another order
   static SwiftOnes of(std::span<S> ways_sq) {
     const std::size_t n = ways_sq.size();
-    const auto longestBut = [&](std::size_t most) {
-      const auto place = ways_sq.begin() + static_cast<std::ptrdiff_t>(most);
+    const auto longestBut = [&](std::size_t swift) {
+      const auto place = ways_sq.begin() + static_cast<std::ptrdiff_t>(swift);
       std::nth_element(ways_sq.begin(), place, ways_sq.end(), [](const S& a, const S& b) { return b < a; });
-      return SwiftOnes{most, *place};
+      return SwiftOnes{swift, *place};
     };
     if (n == 0) {
       return {};
