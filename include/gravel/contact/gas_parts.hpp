@@ -13,83 +13,92 @@
 namespace gravel::detail {
 
 /// A gas that fills its box evenly, not periodic one as wide as the bodies are spread, sqrt(12) of the
-/// deviation along each axis. Ways are less what all have in common.
+/// deviation along each axis. Ways in a step, less what all have in common, are in mean diameters d.
 template <Real S>
 struct GasMotion {
-  S diameter = S(0);   ///< [m] mean
-  S filled = S(0);     ///< [1] n d^3 for the number density n
-  S meanWay = S(0);    ///< [1] in a step, in diameters
-  S widestWay = S(0);  ///< [1] the same, but for swift ones
   S bodies = S(0);     ///< that move and have a radius
-  S swift = S(0);      ///< [1] sum of the ways of the swift ones
+  S filled = S(0);     ///< n d^3 for the number density n
+  S meanWay = S(0);    ///< of all
+  S widestWay = S(0);  ///< of all but the swift ones
+  S swift = S(0);      ///< sum of the ways of these
   S swift_sq = S(0);   ///< and of their squares
 
-  /// In h [s]; widestWay of nobody is known where it is below `least`. O(bodies).
+  /// In h [s]; all zero where no way is above `least`. O(bodies).
   template <class B>
   static GasMotion of(const B& bodies, const Domain<S>& domain, const S& h, const S& least) {
     using std::sqrt;
-    struct Sums {
+    constexpr std::size_t chunk = 1024;
+    const Vector3<S> common =
+        commonWay<S>(bodies.size(), [&](std::size_t i) { return velocityOf(bodies, i); });
+    const auto isTaken = [&](std::size_t i) { return isMovable(bodies, i) && bodies.radii()[i] > S(0); };
+    const auto speed_sq = [&](std::size_t i) {
+      return isTaken(i) ? S(Vector3<S>(velocityOf(bodies, i) - common).squaredNorm()) : S(0);
+    };
+    struct Sizes {
       S count = S(0);
-      S speed = S(0);
-      S fastest = S(0);
       S radius = S(0);
-      Vector3<S> x = Vector3<S>::Zero();
-      Vector3<S> x_sq = Vector3<S>::Zero();
-      Sums& operator+=(const Sums& other) {
+      S fastest_sq = S(0);
+      Sizes& operator+=(const Sizes& other) {
         count += other.count;
-        speed += other.speed;
-        fastest = std::max<S>(fastest, other.fastest);
         radius += other.radius;
-        x += other.x;
-        x_sq += other.x_sq;
+        fastest_sq = std::max<S>(fastest_sq, other.fastest_sq);
         return *this;
       }
     };
-    const Vector3<S> common =
-        commonWay<S>(bodies.size(), [&](std::size_t i) { return velocityOf(bodies, i); });
-    const auto speedOf = [&](std::size_t i) {
-      return isMovable(bodies, i) ? S(sqrt(Vector3<S>(velocityOf(bodies, i) - common).squaredNorm())) : S(0);
-    };
-    const Vector3<S> origin = bodies.positions()[0];
-    const Sums sums = orderedSum(bodies.size(), 1024, Sums{}, [&](std::size_t begin, std::size_t end) {
-      Sums part;
+    const Sizes sizes = orderedSum(bodies.size(), chunk, Sizes{}, [&](std::size_t begin, std::size_t end) {
+      Sizes part;
       for (std::size_t i = begin; i < end; ++i) {
-        const S r = bodies.radii()[i];
-        if (isMovable(bodies, i) && r > S(0)) {
-          const Vector3<S> x = Vector3<S>(bodies.positions()[i]) - origin;
-          const S v = speedOf(i);
-          part += {S(1), v, v, r, x, Vector3<S>(x.cwiseProduct(x))};
-        }
+        const Vector3<S> v = Vector3<S>(bodies.velocities()[i]) - common;
+        const bool taken = isTaken(i);
+        const S v_sq = taken ? S(v.squaredNorm()) : S(0);
+        part.count += taken ? S(1) : S(0);
+        part.radius += taken ? S(bodies.radii()[i]) : S(0);
+        part.fastest_sq = v_sq > part.fastest_sq ? v_sq : part.fastest_sq;
       }
       return part;
     });
     GasMotion gas;
-    gas.bodies = sums.count;
-    if (!(sums.count > S(0))) {
+    const S d = S(2) * sizes.radius / sizes.count;
+    if (!(d > S(0)) || !(S(sqrt(sizes.fastest_sq)) * h > least * d)) {
       return gas;
     }
-    const S d = S(2) * sums.radius / sums.count;
-    gas.diameter = d;
-    gas.filled = sums.count;
+    struct Spread {
+      Vector3<S> x = Vector3<S>::Zero();
+      Vector3<S> x_sq = Vector3<S>::Zero();
+      S way = S(0);
+      Spread& operator+=(const Spread& other) {
+        x += other.x;
+        x_sq += other.x_sq;
+        way += other.way;
+        return *this;
+      }
+    };
+    std::vector<S> ways_sq(bodies.size());
+    const Vector3<S> origin = bodies.positions()[0];
+    const Spread all = orderedSum(bodies.size(), chunk, Spread{}, [&](std::size_t begin, std::size_t end) {
+      Spread part;
+      for (std::size_t i = begin; i < end; ++i) {
+        const S way = S(sqrt(speed_sq(i))) * h / d;
+        ways_sq[i] = way * way;
+        if (isTaken(i)) {
+          const Vector3<S> x = Vector3<S>(bodies.positions()[i]) - origin;
+          part += {x, Vector3<S>(x.cwiseProduct(x)), way};
+        }
+      }
+      return part;
+    });
+    gas.bodies = gas.filled = sizes.count;
     for (int axis = 0; axis < 3; ++axis) {
-      const S mean = sums.x[axis] / sums.count;
-      const S variance = std::max<S>(S(0), S(sums.x_sq[axis] / sums.count - mean * mean));
+      const S mean = all.x[axis] / sizes.count;
+      const S variance = std::max<S>(S(0), S(all.x_sq[axis] / sizes.count - mean * mean));
       gas.filled *= d / (domain.isOpen() ? S(S(sqrt(S(12) * variance)) + d) : domain.lengths()[axis]);
     }
-    gas.meanWay = sums.speed / sums.count * h / d;
-    gas.widestWay = sums.fastest * h / d;
-    if (gas.widestWay > least) {
-      std::vector<S> ways_sq(bodies.size());
-      parallelFor(bodies.size(), 1024, [&](std::size_t i) {
-        const S way = speedOf(i) * h / d;
-        ways_sq[i] = way * way;
-      });
-      const SwiftOnes<S> ones = SwiftOnes<S>::of(ways_sq);
-      gas.widestWay = S(sqrt(ones.next_sq));
-      for (const S& way_sq : ways_sq) {
-        gas.swift += way_sq > ones.next_sq ? S(sqrt(way_sq)) : S(0);
-        gas.swift_sq += way_sq > ones.next_sq ? way_sq : S(0);
-      }
+    gas.meanWay = all.way / sizes.count;
+    const SwiftOnes<S> ones = SwiftOnes<S>::of(ways_sq);
+    gas.widestWay = S(sqrt(ones.next_sq));
+    for (const S& way_sq : ways_sq) {
+      gas.swift += way_sq > ones.next_sq ? S(sqrt(way_sq)) : S(0);
+      gas.swift_sq += way_sq > ones.next_sq ? way_sq : S(0);
     }
     return gas;
   }

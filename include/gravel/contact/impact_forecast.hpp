@@ -67,11 +67,12 @@ class ImpactForecast : protected ImpactPast<S> {
                                   const RelativeFlight<S>& flight, const S& from) {
     const S reach = one.radius + two.radius;
     const std::optional<S> t = timeOfImpact<S>(flight, reach, from);
-    if (scene.domain.isOpen()) {
+    const S half = (from + scene.settings.h) / S(2);
+    if (scene.domain.isNearest(Vector3<S>(flight.r + half * flight.v))) {
       return t;
     }
     Vector3<S> drift;
-    const RelativeFlight<S> other = flightOf(scene, one, two, S((from + scene.settings.h) / S(2)), drift);
+    const RelativeFlight<S> other = flightOf(scene, one, two, half, drift);
     if (other.r == flight.r) {
       return t;
     }

@@ -115,6 +115,12 @@ class Domain {
     }
   }
 
+  /// Whether a separation is so short that no other image of it can be nearer: images are an edge apart.
+  [[gnu::always_inline]] bool isNearest(const Vector3<S>& r) const {
+    const S edge = std::min<S>(lengths_[0], std::min<S>(lengths_[1], lengths_[2]));
+    return isOpen() || S(4) * r.squaredNorm() < edge * edge;
+  }
+
   /// The image that is nearest at t [s] after `time`, with the way [m] that r goes until then: where it is at
   /// `time`. Two that were struck on their way begin it, as it seems, anywhere.
   Vector3<S> imageAt(const Vector3<S>& r, const Vector3<S>& way, const S& t, Vector3<S>& v,

@@ -108,9 +108,9 @@ void compare(std::uint32_t i, const Positions& positions, const Radii& radii, co
   const S bend = S(sqrt(bendOf_sq<S>(travel, i)));
   const bool sheared = !(ahead == S(0));
   const S h = sheared ? S(ahead / (S(1.5) * domain.omega())) : S(0);  // [s]
-  const S aside = slack + free + bend + most;
-  S widest = aside + S(sqrt(length_sq));
+  const S widest = slack + free + bend + most + S(sqrt(length_sq));
   const S rounded = S(1) + S(16) * roundoff<S>();
+  const S left = sizeOf(ahead) < S(1) ? S(S(1) - sizeOf(ahead)) : S(0);
   const S r_i = radii[i];
   const std::uint64_t id = idKey(ids[i]);
   for (std::uint32_t j = 0; j < positions.size(); ++j) {
@@ -120,36 +120,29 @@ void compare(std::uint32_t i, const Positions& positions, const Radii& radii, co
     }
     const Vector3<S> way_j = wayOf<S>(travel, j);
     const Vector3<S> apart = Vector3<S>(positions[j]) - x;
-    const auto nearestAt = [&](const S& part) {
+    const S straight_sq = way_j.squaredNorm();
+    // Most are so far that no image comes near, since none is nearer now, and the flow takes one at r by
+    // `ahead` |r| at most: (a + b)^2 <= 2 (a^2 + b^2).
+    const S near = radii_ij + widest;
+    if (domain.minimumImage(apart, time).squaredNorm() * (left * left) >
+        S(2) * rounded * (near * near + straight_sq)) {
+      continue;
+    }
+    const S way_sq = squareOfSum<S>(straight_sq, bendOf_sq<S>(travel, j));
+    // Another course may take it anywhere within its half of the skin, which is this far at most.
+    const S reach = radii_ij + slack + bend + std::max<S>(S(sqrt(way_sq)), free);
+    for (const S& part : {share, S((S(1) + share) / S(2))}) {  // see ImpactForecast::meeting()
       Vector3<S> between = way_j - own;
       between[1] -= ahead * apart[0];  // with the flow again
       Vector3<S> drift = Vector3<S>::Zero();
-      return domain.imageAt(apart, Vector3<S>(part * between), S(part * h), drift, time);
-    };
-    const S straight_sq = way_j.squaredNorm();
-    // Another course may take it anywhere within its half of the skin, which is this far at most.
-    const auto reaches = [&](const Vector3<S>& r) {
-      const S way_sq = squareOfSum<S>(straight_sq, bendOf_sq<S>(travel, j));
-      const S reach = radii_ij + slack + bend + std::max<S>(S(sqrt(way_sq)), free);
-      // The nearest point of the way: x + way s, 0 <= s <= 1.
-      const S s = length_sq > S(0) ? std::min<S>(S(1), std::max<S>(S(0), S(way.dot(r) / length_sq))) : S(0);
-      return Vector3<S>(r - s * way).squaredNorm() <= reach * reach * rounded;
-    };
-    for (const S& part : {share, S((S(1) + share) / S(2))}) {  // see ImpactForecast::meeting()
-      Vector3<S> r = sheared ? nearestAt(part) : domain.minimumImage(apart, time);
+      const Vector3<S> r = domain.imageAt(apart, Vector3<S>(part * between), S(part * h), drift, time);
       if (sheared) {  // as seen from the flow where j is
         way[1] = own[1] + ahead * r[0];
         length_sq = way.squaredNorm();
-        widest = aside + S(sqrt(length_sq));
       }
-      // Most are too far for any of what follows: (a + b)^2 <= 2 (a^2 + b^2). Where images go no ways of
-      // their own none is nearer than that.
-      const S near = radii_ij + widest;
-      const bool far = r.squaredNorm() > S(2) * rounded * (near * near + straight_sq);
-      if (far && !sheared) {
-        break;
-      }
-      if (!far && reaches(sheared ? r : nearestAt(part))) {
+      // The nearest point of the way: x + way s, 0 <= s <= 1.
+      const S s = length_sq > S(0) ? std::min<S>(S(1), std::max<S>(S(0), S(way.dot(r) / length_sq))) : S(0);
+      if (Vector3<S>(r - s * way).squaredNorm() <= reach * reach * rounded) {
         out.push_back(id < idKey(ids[j]) ? Pair{i, j} : Pair{j, i});
         break;
       }
