@@ -297,6 +297,57 @@ TEST_CASE("What touches as a scene begins is struck before anything pulls, on a 
   }
 }
 
+// Seen to fail: all contacts solved together with the blow (other bits, and loads 1.8e-4 off).
+TEST_CASE("A blow with which a step begins changes no bit of a stack that rests elsewhere") {
+  SimulationConfig<double> config = plain(4e-3);
+  config.coeffRestitution = 0.8;
+  Space<double> space(config);
+  space.setUniformField({0, 0, -9.81});
+  space.addPlane({0, 0, 1}, 0);
+  for (int k = 0; k < 5; ++k) {
+    space.addBody(ball({0, 0, 0.1 + 0.2 * k}, {0, 0, 0}, 0.1));
+  }
+  advance(space, 100);
+  const auto withPair = [&](double apart, double speed) {
+    Space<double> other = space;
+    for (const double side : {-1.0, 1.0}) {
+      other.addBody(ball({5 + side * apart / 2, 0, 7}, {-side * speed, 0, 0}, 0.1));
+    }
+    advance(other, 3);
+    return other;
+  };
+  const Space<double> struck = withPair(0.2, 3);
+  const Space<double> alone = withPair(1, 0);
+  CHECK_THAT(struck.body(6).velocity()[0], WithinAbs(0.8 * 3, 1e-14));
+  for (std::size_t i = 0; i < 5; ++i) {
+    CHECK(Vec(struck.body(i).velocity()) == Vec(alone.body(i).velocity()));
+    CHECK(Vec(struck.body(i).position()) == Vec(alone.body(i).position()));
+  }
+  CHECK_THAT(struck.supportedWeight().load[2], WithinRel(alone.supportedWeight().load[2], 1e-14));
+}
+
+// v = e u exp(-c t) for the drag -c v by mass. Errors over h^2 are 0.66 u. Seen to fail: forces of before the
+// blow kept (first order, 8e-3 at h = 4 ms).
+TEST_CASE("A force that depends on velocities sees the blow with which a step begins, to second order") {
+  const auto errorOf = [](double h) {
+    SimulationConfig<double> config = plain(h);
+    config.coeffRestitution = 0.8;
+    Space<double> space(config);
+    space.addPlane({0, 0, 1}, 0);
+    space.setUniformField({0, 0, -1e-9});
+    space.addBody(ball({0, 0, 0.1}, {0, 0, -1}, 0.1));
+    space.setForceHook([](Bodies<double, SoA>& bodies, double) {
+      bodies[0].force() -= 3 * bodies[0].mass() * Vec(bodies[0].velocity());
+    });
+    space.advanceTo(0.1);
+    return std::abs(space.body(0).velocity()[2] - 0.8 * std::exp(-0.3));
+  };
+  const double order = std::log2(errorOf(4e-3) / errorOf(2e-3));
+  CAPTURE(errorOf(4e-3), errorOf(2e-3));
+  CHECK(order > 1.9);
+  CHECK(order < 2.1);
+}
+
 TEST_CASE("A light sphere on one a thousand million times its mass bounces as off a wall") {
   SimulationConfig<double> config = plain(1e-4);
   config.coeffRestitution = 0.8;

@@ -592,7 +592,7 @@ TEST_CASE(
         domain.wrap(cloud.positions[i], none, 0.0);
       }
     }
-    CHECK(met > 60);
+    CHECK(met > 200);
     CHECK(list.searches() < 30);
   }
 }

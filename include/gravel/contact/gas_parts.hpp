@@ -5,15 +5,19 @@
 
 #include <gravel/contact/contact_bodies.hpp>
 #include <gravel/core/parallel.hpp>
+#include <gravel/core/random.hpp>
 #include <gravel/spatial/domain.hpp>
 #include <gravel/spatial/strays.hpp>
 
 #include <algorithm>
+#include <array>
+#include <vector>
 
 namespace gravel::detail {
 
-/// A gas that fills its box evenly, not periodic one as wide as the bodies are spread, sqrt(12) of the
-/// deviation along each axis. Ways in a step, less what all have in common, are in mean diameters d.
+/// A gas that fills its box evenly; not periodic one as wide as three quarters of the bodies are, and a third
+/// more. Ways in a step, less what all have in common, are in diameters d, the median. Widths and d are those
+/// of 256 bodies that chance picks, so that a few far or large ones have no say.
 template <Real S>
 struct GasMotion {
   S bodies = S(0);     ///< that move and have a radius
@@ -27,73 +31,74 @@ struct GasMotion {
   template <class B>
   static GasMotion of(const B& bodies, const Domain<S>& domain, const S& h, const S& least) {
     using std::sqrt;
-    constexpr std::size_t chunk = 1024;
     const Vector3<S> common =
         commonWay<S>(bodies.size(), [&](std::size_t i) { return velocityOf(bodies, i); });
     const auto isTaken = [&](std::size_t i) { return isMovable(bodies, i) && bodies.radii()[i] > S(0); };
-    const auto speed_sq = [&](std::size_t i) {
-      return isTaken(i) ? S(Vector3<S>(velocityOf(bodies, i) - common).squaredNorm()) : S(0);
-    };
-    struct Sizes {
-      S count = S(0);
-      S radius = S(0);
+    struct Limits {
       S fastest_sq = S(0);
-      Sizes& operator+=(const Sizes& other) {
-        count += other.count;
-        radius += other.radius;
+      S smallest = highest<S>();
+      Limits& operator+=(const Limits& other) {
         fastest_sq = std::max<S>(fastest_sq, other.fastest_sq);
+        smallest = std::min<S>(smallest, other.smallest);
         return *this;
       }
     };
-    const Sizes sizes = orderedSum(bodies.size(), chunk, Sizes{}, [&](std::size_t begin, std::size_t end) {
-      Sizes part;
+    const auto limits = orderedSum(bodies.size(), chunk, Limits{}, [&](std::size_t begin, std::size_t end) {
+      Limits part;
       for (std::size_t i = begin; i < end; ++i) {
         const Vector3<S> v = Vector3<S>(bodies.velocities()[i]) - common;
         const bool taken = isTaken(i);
         const S v_sq = taken ? S(v.squaredNorm()) : S(0);
-        part.count += taken ? S(1) : S(0);
-        part.radius += taken ? S(bodies.radii()[i]) : S(0);
+        const S r = taken ? S(bodies.radii()[i]) : highest<S>();
         part.fastest_sq = v_sq > part.fastest_sq ? v_sq : part.fastest_sq;
+        part.smallest = r < part.smallest ? r : part.smallest;
       }
       return part;
     });
     GasMotion gas;
-    const S d = S(2) * sizes.radius / sizes.count;
-    if (!(d > S(0)) || !(S(sqrt(sizes.fastest_sq)) * h > least * d)) {
+    if (!(S(sqrt(limits.fastest_sq)) * h > least * S(2) * limits.smallest)) {
       return gas;
     }
-    struct Spread {
-      Vector3<S> x = Vector3<S>::Zero();
-      Vector3<S> x_sq = Vector3<S>::Zero();
-      S way = S(0);
-      Spread& operator+=(const Spread& other) {
-        x += other.x;
-        x_sq += other.x_sq;
-        way += other.way;
-        return *this;
-      }
-    };
-    std::vector<S> ways_sq(bodies.size());
-    const Vector3<S> origin = bodies.positions()[0];
-    const Spread all = orderedSum(bodies.size(), chunk, Spread{}, [&](std::size_t begin, std::size_t end) {
-      Spread part;
-      for (std::size_t i = begin; i < end; ++i) {
-        const S way = S(sqrt(speed_sq(i))) * h / d;
-        ways_sq[i] = way * way;
-        if (isTaken(i)) {
-          const Vector3<S> x = Vector3<S>(bodies.positions()[i]) - origin;
-          part += {x, Vector3<S>(x.cwiseProduct(x)), way};
+    std::array<std::vector<S>, 4> picked;  // coordinates and radii
+    const CounterRandom chance(1, 0);
+    for (std::uint64_t k = 0; k < 256; ++k) {
+      const double at = chance.uniform(k, 0.0, static_cast<double>(bodies.size()));
+      const std::size_t i = std::min(static_cast<std::size_t>(at), bodies.size() - 1);
+      if (isTaken(i)) {
+        const Vector3<S> x = bodies.positions()[i];
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          picked[axis].push_back(x[static_cast<Eigen::Index>(axis)]);
         }
+        picked[3].push_back(bodies.radii()[i]);
       }
-      return part;
-    });
-    gas.bodies = gas.filled = sizes.count;
-    for (int axis = 0; axis < 3; ++axis) {
-      const S mean = all.x[axis] / sizes.count;
-      const S variance = std::max<S>(S(0), S(all.x_sq[axis] / sizes.count - mean * mean));
-      gas.filled *= d / (domain.isOpen() ? S(S(sqrt(S(12) * variance)) + d) : domain.lengths()[axis]);
     }
-    gas.meanWay = all.way / sizes.count;
+    if (picked[3].empty()) {
+      return gas;
+    }
+    for (std::vector<S>& numbers : picked) {
+      std::sort(numbers.begin(), numbers.end());
+    }
+    const std::size_t eighth = picked[3].size() / 8;
+    const S d = S(2) * picked[3][picked[3].size() / 2];
+    std::vector<S> ways_sq(bodies.size());
+    parallelFor(bodies.size(), chunk, [&](std::size_t i) {
+      const S v_sq = isTaken(i) ? S(Vector3<S>(velocityOf(bodies, i) - common).squaredNorm()) : S(0);
+      const S way = S(sqrt(v_sq)) * h / d;
+      ways_sq[i] = way * way;
+    });
+    S ways(0);
+    std::size_t taken = 0;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      ways += S(sqrt(ways_sq[i]));
+      taken += isTaken(i) ? 1U : 0U;
+    }
+    gas.bodies = gas.filled = S(static_cast<double>(taken));
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::vector<S>& x = picked[static_cast<std::size_t>(axis)];
+      const S width = (x[x.size() - 1 - eighth] - x[eighth]) * S(4) / S(3);
+      gas.filled *= d / (domain.isOpen() ? S(width + d) : domain.lengths()[axis]);
+    }
+    gas.meanWay = ways / gas.bodies;
     const SwiftOnes<S> ones = SwiftOnes<S>::of(ways_sq);
     gas.widestWay = S(sqrt(ones.next_sq));
     for (const S& way_sq : ways_sq) {
@@ -122,6 +127,9 @@ struct GasMotion {
     return S(0.3) * parts + (S(0.01) * parts + S(0.025) * collisions) * candidates(parts) +
            S(0.012) * width * (swift + width * swift_sq / parts);
   }
+
+ private:
+  static constexpr std::size_t chunk = 1024;
 };
 
 /// The number of parts, `most` at most, in which a step of h [s] takes the least time: each collision is a

@@ -59,8 +59,8 @@ class ContactStage {
               Profiler& profiler);
   /// Before a step: contacts get the surfaces that settings, pairs and bodies have by now. O(bodies).
   void renewSurfaces(const Bodies& bodies, const Config& config);
-  /// At its start: blows of what touches, if contacts were found anew. O(contacts) then.
-  void strikeTouching(Bodies& bodies, const Config& config, const Scalar& h, Profiler& profiler);
+  /// At its start: blows of what touches, if contacts were found anew. O(contacts) then. \return any
+  bool strikeTouching(Bodies& bodies, const Config& config, const Scalar& h, Profiler& profiler);
 
   // Of planes that move: contact_stage_planes.hpp.
   void setPlaneVelocity(std::size_t plane, const Vector3<Scalar>& velocity);
@@ -107,13 +107,8 @@ class ContactStage {
     }
     colour(bodies, profiler);
     const Profiler::Scope scope(profiler, Phase::ContactSolve);
-    ContactSettings<Scalar> settings = solver_.settings();
-    settings.restitutionThreshold = std::max(config.restitutionThreshold, config.epsilon);
-    settings.tolerance = config.contactTolerance;
-    settings.gapStep = gapStep_;
     remembers_ = report_.contacts > 0 ? remembers_ : solver_.remembers();
-    limitSweeps(settings, config.contactIterations, contacts_.size(), remembers_);
-    solver_.setSettings(settings);
+    solver_.setSettings(settingsOf(config, contacts_.size(), remembers_));
     solver_.rebind(contacts_);  // the space may be a copy
     findBends(bodies, drifts ? h : Scalar(0));
     const ContactReport<Scalar> half =
@@ -207,6 +202,7 @@ class ContactStage {
   template <class Visit>
   void forEachBefore(Visit&& visit) const;
   void bookKick(const Bodies& bodies, const Scalar& kick);
+  ContactSettings<Scalar> settingsOf(const Config& config, std::size_t contacts, bool remembers) const;
   void colour(const Bodies& bodies, Profiler& profiler) {
     if (!coloured_) {
       const Profiler::Scope scope(profiler, Phase::Colouring);

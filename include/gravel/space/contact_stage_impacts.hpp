@@ -3,6 +3,7 @@
 /// \file
 /// Members of `ContactStage` that deal the impacts inside a step, and those with which it begins.
 
+#include <gravel/contact/contact_islands.hpp>
 #include <gravel/dynamics/epicycle_course.hpp>
 #include <gravel/space/contact_stage.hpp>
 
@@ -59,13 +60,14 @@ struct WaysAfterBlows {
 }  // namespace detail
 
 /// The solve after the first kick would give back e times what the kick brings as well: a ball that touches
-/// the floor and falls at u left it at e u + (1 + e) g h/2. So it is made before the kick, as a step's end
-/// does.
+/// the floor and falls at u left it at e u + (1 + e) g h/2. So it is made before the kick, of the islands in
+/// which there is such a blow, and with a solver of its own: what rests is to be told nothing of it, and the
+/// impulses that bear its weight are to stay.
 template <Real Scalar, class Layout>
-void ContactStage<Scalar, Layout>::strikeTouching(Bodies& bodies, const Config& config, const Scalar& h,
+bool ContactStage<Scalar, Layout>::strikeTouching(Bodies& bodies, const Config& config, const Scalar& h,
                                                   Profiler& profiler) {
   if (!std::exchange(anew_, false) || contacts_.empty()) {
-    return;
+    return false;
   }
   drivePlanes(bodies, Scalar(0), h);
   const auto fall = [&](std::uint32_t i) {
@@ -83,17 +85,48 @@ void ContactStage<Scalar, Layout>::strikeTouching(Bodies& bodies, const Config& 
     }
     return falls > Scalar(0) && -c.normal.dot(v_rel) > slow + Scalar(2) * (surface.driftChange + falls * h);
   };
-  if (std::none_of(contacts_.contacts.begin(), contacts_.contacts.end(), isBlow)) {
-    return;
+  if (std::none_of(contacts_.begin(), contacts_.end(), isBlow)) {
+    return false;
   }
-  solve(bodies, config, h, false, profiler);
-  if (acted_) {
-    record_.add([&](auto&& visit) {
-      for (std::size_t k = 0; k < contacts_.size(); ++k) {
-        visit(contacts_[k], solver_.impulses()[k]);
-      }
-    });
+  const Profiler::Scope scope(profiler, Phase::ContactSolve);
+  ContactIslands islands;
+  islands.find(std::span<const Contact<Scalar>>(contacts_.contacts), bodies);
+  const auto islandOf = [&](const Contact<Scalar>& c) {
+    return islands.of(detail::isMovable(bodies, c.first) || c.second == staticPartner ? c.first : c.second);
+  };
+  std::vector<std::uint8_t> struck(bodies.size(), 0);
+  for (const Contact<Scalar>& c : contacts_) {
+    if (isBlow(c)) {
+      struck[islandOf(c)] = 1;
+    }
   }
+  ContactList<Scalar> blows{{}, contacts_.surfaces};
+  std::copy_if(contacts_.begin(), contacts_.end(), std::back_inserter(blows.contacts),
+               [&](const Contact<Scalar>& c) { return struck[islandOf(c)] != 0; });
+  ContactSolver<Scalar> solver;
+  solver.setSettings(settingsOf(config, blows.size(), false));
+  solver.begin(blows, bodies);
+  findBends(bodies, Scalar(0));
+  report_.addSolve(solver.solve(bodies, h, {false, bend_, domain.omega(), h / Scalar(2), carried_}));
+  report_.contacts = 0;  // the step's first solve is still to come
+  const std::span<const ContactImpulse<Scalar>> impulses = solver.impulses();
+  record_.add([&](auto&& visit) {
+    for (std::size_t k = 0; k < blows.size(); ++k) {
+      visit(blows[k], impulses[k]);
+    }
+  });
+  return true;
+}
+
+template <Real Scalar, class Layout>
+ContactSettings<Scalar> ContactStage<Scalar, Layout>::settingsOf(const Config& config, std::size_t contacts,
+                                                                 bool remembers) const {
+  ContactSettings<Scalar> settings = solver_.settings();
+  settings.restitutionThreshold = std::max(config.restitutionThreshold, config.epsilon);
+  settings.tolerance = config.contactTolerance;
+  settings.gapStep = gapStep_;
+  limitSweeps(settings, config.contactIterations, contacts, remembers);
+  return settings;
 }
 
 template <Real Scalar, class Layout>

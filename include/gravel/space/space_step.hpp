@@ -98,7 +98,9 @@ void Space<Scalar, Layout>::step(const Scalar h, std::size_t iteration, const Sc
       more = moveFewPoints(h, until, timing);
     } else {
       contact_dt_ = h / Scalar(static_cast<double>(parts_));
-      contact_.strikeTouching(bodies_, this->config_, contact_dt_, profiler_);
+      if (contact_.strikeTouching(bodies_, this->config_, contact_dt_, profiler_) && force_.hook) {
+        applyGravity();  // the user's force may depend on velocities
+      }
       Scalar found(0);
       for (std::size_t part = 0; part < parts_; ++part) {
         advance(h, part, parts_, found);
