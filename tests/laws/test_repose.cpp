@@ -137,14 +137,22 @@ TEST_CASE("Grains with friction stand at an angle where smooth ones run off") {
   CHECK(angles[2] > smooth.angle + 6.0);
 }
 
-// Four seeds rest at 24.4 to 30.0 degrees. Seen to fail: one part, or parts chosen by speeds alone, where the
-// rms speed is still 0.003 to 0.3 sqrt(g d).
+// Where a grain comes to rest at last hangs on the last bits: of ten heaps two still have one that rolls, so
+// the middle one is asked. Seen to fail: one part (2.2e-2 sqrt(g d), 20 degrees).
 TEST_CASE("Parts chosen by motion let a heap rest at steps at which its flanks would creep") {
   Shape coarse;
   coarse.timeStep = 0.2;
   coarse.parts = 0;
-  const Heap heap = heapAfterWalls(0.3, 0.0, 2, coarse);
-  CAPTURE(heap.angle, heap.speed);
-  CHECK(heap.speed < 1e-3);
-  CHECK(heap.angle > 19.0);
+  std::vector<double> angles;
+  std::vector<double> speeds;
+  for (std::uint64_t seed = 2; seed < 12; ++seed) {
+    const Heap heap = heapAfterWalls(0.3, 0.0, seed, coarse);
+    angles.push_back(heap.angle);
+    speeds.push_back(heap.speed);
+  }
+  std::sort(angles.begin(), angles.end());
+  std::sort(speeds.begin(), speeds.end());
+  CAPTURE(angles, speeds);
+  CHECK(speeds[5] < 1e-3);
+  CHECK(angles[5] > 23.0);
 }
